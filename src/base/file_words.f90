@@ -1,9 +1,10 @@
 !> Text files that are read word by word: words between blanks and line ends, `#` begins a remark.
 !! A byte-order mark at the start of a file is passed over.
 module file_words_m
-  use kinds_m, only: wp, i8
+  use kinds_m, only: wp
   use errors_m, only: to_text
   use posix_file_m, only: is_pipe
+  use text_file_m, only: read_bytes
   use value_text_m, only: byte_order_mark, parse_real, parse_integer, value_ok, value_too_large, &
     quoted_text, printable
   implicit none
@@ -22,37 +23,17 @@ module file_words_m
 
 contains
 
-  !> The bytes of a file, line ends as line feeds.
+  !> The bytes of a file.
   subroutine read_whole(file, words)
     character(*), intent(in) :: file
     type(words_t), intent(out) :: words
-    integer(i8) :: length
-    integer :: unit, status
-    logical :: there
 
-    words%problem = ''
+    words%problem = 'is a pipe, must be a file'
     words%text = ''
     words%line = 0
-    if (is_pipe(file)) then
-      words%problem = 'is a pipe, must be a file'
-      return
-    end if
-    inquire (file=file, exist=there, size=length)
-    open (newunit=unit, file=file, access='stream', form='unformatted', action='read', &
-          status='old', iostat=status)
-    if (status /= 0 .or. .not. there) then
-      words%problem = 'there is no such file, or it may not be read'
-      return
-    end if
-    if (length > longest_text .or. length < 0) then
-      words%problem = 'longer than 500 MB'
-    else
-      words%text = repeat(' ', int(length))
-      read (unit, iostat=status) words%text
-      if (status /= 0) words%problem = 'could not be read'
-    end if
-    close (unit)
-    words%line = 1
+    if (.not. is_pipe(file)) call read_bytes(file, longest_text, words%text, words%problem)
+    if (words%problem == 'too long') words%problem = 'longer than 500 MB'
+    if (len(words%problem) == 0) words%line = 1
   end subroutine read_whole
 
   !> Note a problem; only the first counts.

@@ -12,8 +12,8 @@ module allowed_values_m
     real(wp) :: low = -boundless, high = boundless
     logical :: with_low = .true.             !! may the value be `low` itself?
     logical :: whole = .false.
-    character(:), allocatable :: unit        !! '-' for a pure number, empty for a count
-    character(:), allocatable :: zero        !! what 0 means if that is special, else empty
+    character(16) :: unit = ''               !! '-' for a pure number, empty for a count
+    character(48) :: zero = ''               !! what 0 means if that is special, else empty
     integer :: fewest = 0                    !! values of a list that may be short; 0: all
   contains
     procedure :: problem => allowed_problem
@@ -32,17 +32,14 @@ contains
     character(*), intent(in) :: unit
     type(allowed_t) :: allowed
 
-    allowed%unit = unit
-    allowed%zero = ''
+    allowed = allowed_t(unit=unit)
   end function any_number
 
   pure function positive(unit) result(allowed)
     character(*), intent(in) :: unit
     type(allowed_t) :: allowed
 
-    allowed = any_number(unit)
-    allowed%low = 0.0_wp
-    allowed%with_low = .false.
+    allowed = allowed_t(unit=unit, low=0.0_wp, with_low=.false.)
   end function positive
 
   pure function not_negative(unit, zero) result(allowed)
@@ -50,8 +47,7 @@ contains
     character(*), intent(in), optional :: zero   !! such as '0 means never'
     type(allowed_t) :: allowed
 
-    allowed = any_number(unit)
-    allowed%low = 0.0_wp
+    allowed = allowed_t(unit=unit, low=0.0_wp)
     if (present(zero)) allowed%zero = zero
   end function not_negative
 
@@ -59,23 +55,20 @@ contains
   pure function share() result(allowed)
     type(allowed_t) :: allowed
 
-    allowed = positive('-')
-    allowed%high = 1.0_wp
+    allowed = allowed_t(unit='-', low=0.0_wp, with_low=.false., high=1.0_wp)
   end function share
 
   pure function any_whole() result(allowed)
     type(allowed_t) :: allowed
 
-    allowed = any_number('')
-    allowed%whole = .true.
+    allowed = allowed_t(whole=.true.)
   end function any_whole
 
   pure function at_least(low) result(allowed)
     integer, intent(in) :: low
     type(allowed_t) :: allowed
 
-    allowed = any_whole()
-    allowed%low = real(low, wp)
+    allowed = allowed_t(whole=.true., low=real(low, wp))
   end function at_least
 
   pure function between_reals(low, high, unit) result(allowed)
@@ -83,17 +76,14 @@ contains
     character(*), intent(in) :: unit
     type(allowed_t) :: allowed
 
-    allowed = any_number(unit)
-    allowed%low = low
-    allowed%high = high
+    allowed = allowed_t(unit=unit, low=low, high=high)
   end function between_reals
 
   pure function between_wholes(low, high) result(allowed)
     integer, intent(in) :: low, high
     type(allowed_t) :: allowed
 
-    allowed = at_least(low)
-    allowed%high = real(high, wp)
+    allowed = allowed_t(whole=.true., low=real(low, wp), high=real(high, wp))
   end function between_wholes
 
   !> What is wrong with some of the values, and what is allowed; empty if nothing is.
@@ -105,7 +95,7 @@ contains
     text = ''
     if (all(x > self%low .or. (self%with_low .and. x >= self%low)) .and. all(x <= self%high)) return
     if (self%low > 0.0_wp .and. .not. self%whole .and. any(x <= 0.0_wp)) then
-      text = 'must be positive ['//self%unit//']'
+      text = 'must be positive ['//trim(self%unit)//']'
     else if (self%bounded_above() .and. self%with_low) then
       text = 'must lie '//self%words()
       if (self%unit /= '-') text = trim(text//' '//self%unit)
@@ -115,8 +105,8 @@ contains
     else
       text = 'must be '
       if (self%with_low) text = 'must not be '
-      text = text//merge('negative', 'positive', self%with_low)//' ['//self%unit//']'
-      if (len(self%zero) > 0) text = text//'; '//self%zero
+      text = text//merge('negative', 'positive', self%with_low)//' ['//trim(self%unit)//']'
+      if (self%zero /= '') text = text//'; '//trim(self%zero)
     end if
   end function allowed_problem
 
@@ -135,7 +125,7 @@ contains
       text = to_text(self%low)//' or more'
     else if (self%with_low) then
       text = 'not negative'
-      if (len(self%zero) > 0) text = text//'; '//self%zero
+      if (self%zero /= '') text = text//'; '//trim(self%zero)
     else
       text = 'positive'
     end if

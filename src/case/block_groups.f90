@@ -215,7 +215,7 @@ contains
     call v%real('blockiness', shape%blockiness, between(0.3_wp, 0.9_wp, '-'), &
       'for kind = ''rock'': volume of a stone over that of the box around it', &
       example=kind//'blockiness = 0.6')
-    if (shape%kind /= 'rock' .or. .not. v%reading) return
+    if (shape%kind /= 'rock') return
     call v%require('name', len_trim(shape%name) <= name_length - 5, 'the name of a family has at ' &
       //'most '//to_text(name_length - 5)//' letters, its stones are numbered')
     if (shape%mass_max <= 0.0_wp .or. .not. v%good('mass_min mass_max mass_50 uniformity')) return
@@ -245,7 +245,8 @@ contains
     character(name_length), intent(in) :: shapes(:)
 
     body%line = v%group%line
-    call v%about('one block, there from the start or released later')
+    call v%about('one block, there from the start or released later', &
+      ways='shape position|shape motion')
     if (.not. allocated(body%motion)) body%motion = ''
     call visit_shape_name(v, body%shape, shapes, required=.true.)
     call v%text('motion', body%motion, 'a table that moves a fixed block: a CSV file of columns ' &
@@ -278,7 +279,8 @@ contains
 
     drop%line = v%group%line
     if (.not. allocated(drop%file)) drop%file = ''
-    call v%about('blocks dropped one after another: at one place, along a line, or as a table says')
+    call v%about('blocks dropped one after another: at one place, along a line, or as a table ' &
+      //'says', ways='shape position|shapes position|file')
     call v%text('file', drop%file, 'a table of places in CSV, in place of shape to interval and ' &
       //'orientation to velocity: columns shape, x, y, z (empty: on what lies there), time; if ' &
       //'wanted qw, qx, qy, qz or yaw_deg, pitch_deg, roll_deg; vx, vy, vz; fixed; name', &
@@ -289,7 +291,7 @@ contains
       //'orientation quaternion axis angle_deg velocity', 'a file of places', 'the file has it')
     call visit_drop_shapes(v, drop, shapes, table)
     call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
-      example='0.15, 0.05, 0.16', required=.not. (v%reading .and. table))
+      example='0.15, 0.05, 0.16', required=.not. table)
     call v%integer('count', drop%count, between(1, max_drops), 'how many blocks', example='6')
     call v%without_meaning(drop%count == 1 .and. v%good('count') .and. .not. table, 'to', &
       'count = 1', 'a line needs more blocks')
@@ -329,10 +331,9 @@ contains
     logical :: several
     integer :: i, n
 
-    several = v%given('shapes') .or. (v%writing .and. drop%shapes(1) /= '')
+    several = v%given('shapes') .or. drop%shapes(1) /= ''
     call v%without_meaning(several, 'shape', 'shapes', 'give one of the two')
-    call visit_shape_name(v, drop%shape, shapes, &
-      required=.not. (v%reading .and. (table .or. several)))
+    call visit_shape_name(v, drop%shape, shapes, required=.not. (table .or. several))
     call v%names('shapes', drop%shapes, 'several shapes, of which the seed draws one for each ' &
       //'block, in place of shape', example='''hexapod'', ''hexapod''')
     n = count(drop%shapes /= '')
@@ -343,10 +344,9 @@ contains
       'shapes draws from several')
     weights = not_negative('-')
     weights%fewest = 1
-    if (v%describing) drop%weights(1) = 1.0_wp
     call v%real('weights', drop%weights, weights, 'how likely each of shapes is beside others', &
       example='shapes = ''hexapod'', ''hexapod''  weights = 3, 1')
-    if (.not. (v%reading .and. several .and. v%good('shapes weights'))) return
+    if (.not. (several .and. v%good('shapes weights'))) return
     if (.not. v%given('weights')) drop%weights(:n) = 1.0_wp
     call v%require('weights', count(is_given(drop%weights)) == n, &
       'must be '//to_text(n)//', one for each of shapes')
@@ -415,7 +415,6 @@ contains
 
     call v%real('quaternion', q, any_number('-'), 'attitude as a quaternion w, x, y, z of any ' &
       //'length but 0', example='0.707, 0, 0.707, 0')
-    if (v%writing) return
     axis = absent
     angle_deg = absent
     call v%real('axis', axis, any_number('-'), 'attitude, in place of quaternion: turned about ' &

@@ -1,15 +1,15 @@
-!> All groups of a case: which there are, reading and writing them, and the checks across groups
-!! that need no geometry.
+!> All groups of a case: which there are, reading them, and the checks across groups that need no
+!! geometry.
 !!
-!! Each group stands in one `visit_...` procedure, which serves reading, writing and describing
-!! alike. Nothing stops here: all that is wrong is collected.
+!! Each group stands in one `visit_...` procedure. Nothing stops here: all that is wrong is
+!! collected.
 module case_input_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t, shape_input_t, is_given, has_flow, member_name, max_variants
   use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
-  use description_m, only: group_description_t
+  use string_builder_m, only: string_builder_t
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: visit_run, visit_grid, visit_boundary, side_name
   use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics
@@ -20,10 +20,10 @@ module case_input_m
     parse_integer, value_ok
   implicit none
   private
-  public :: read_case, parameters_text, describe_groups
+  public :: read_case, parameters_text, group_names, is_repeated, list_entries
 
   !> The groups of the contract; those from `first_repeated` on may be repeated.
-  character(name_length), parameter :: groups(*) = [character(name_length) :: 'run', 'grid', &
+  character(name_length), parameter :: group_names(*) = [character(name_length) :: 'run', 'grid', &
     'boundary', 'fluid', 'numerics', 'contact', 'bed', 'start', 'water', 'shape', 'body', 'drop']
   integer, parameter :: first_repeated = 9
 
@@ -38,9 +38,9 @@ contains
     type(namelist_text_t) :: list
     type(group_visitor_t) :: v
     character(name_length), allocatable :: shapes(:)
-    integer :: i
-    integer :: n(size(groups))            ! how many of each group came by
-    integer :: first_line(size(groups))   ! where the first of each begins
+    integer :: i, g
+    integer :: n(size(group_names))            ! how many of each group came by
+    integer :: first_line(size(group_names))   ! where the first of each begins
 
     call set_empty(case)
     case%text = text
@@ -51,15 +51,41 @@ contains
     shapes = shape_names(list)
     n = 0
     do i = 1, list%n
-      call read_group(list%group(i), shapes, n, first_line, v, case)
+      call v%start(list%group(i))
+      g = findloc(group_names == list%group(i)%name, .true., 1)
+      if (g == 0) then
+        call v%report(': unknown group, nearest known: &' &
+                      //nearest_name(printable(list%group(i)%name), group_names))
+      else if (n(g) > 0 .and. .not. is_repeated(g)) then
+        call v%report(': the group is given twice, first on line '//to_text(first_line(g)))
+      else
+        if (n(g) == 0) first_line(g) = list%group(i)%line
+        n(g) = n(g) + 1
+        call visit_group(v, case, group_names(g), n(g), shapes)
+        list%group(i) = v%group   ! remembers which variables are faulty
+      end if
     end do
-    call read_missing_groups(n, v, case)
+    do g = 1, 2   ! run and grid hold required variables
+      if (n(g) > 0) cycle
+      call v%start_empty(group_names(g))
+      call visit_group(v, case, group_names(g), 1, shapes)
+    end do
     call check_together(list, case, v)
     call name_members(case)
     problems = v%problems
     if (present(passed_over)) passed_over = v%passed_over
-    if (case%run%physics == 'fluid') call leave_out_blocks(case)
+    if (case%run%physics /= 'fluid') return
+    deallocate (case%shape, case%body, case%drop)   ! fluid alone
+    allocate (case%shape(0), case%body(0), case%drop(0))
   end subroutine read_case
+
+  !> May a case hold several of group g?
+  pure function is_repeated(g) result(yes)
+    integer, intent(in) :: g
+    logical :: yes
+
+    yes = g >= first_repeated
+  end function is_repeated
 
   !> A family of stones becomes one shape for each; each body that names the family takes the next.
   subroutine name_members(case)
@@ -100,14 +126,6 @@ contains
     n = merge(shape%variants, 0, shape%kind == 'rock')
   end function members
 
-  !> Fluid alone: the blocks that the case names and their shapes are not there.
-  subroutine leave_out_blocks(case)
-    type(case_t), intent(inout) :: case
-
-    deallocate (case%shape, case%body, case%drop)
-    allocate (case%shape(0), case%body(0), case%drop(0))
-  end subroutine leave_out_blocks
-
   !> Texts that the types of a case cannot give a default to.
   subroutine set_empty(case)
     type(case_t), intent(inout) :: case
@@ -132,34 +150,7 @@ contains
     end do
   end function count_groups
 
-  !> Hand a group to its procedure.
-  subroutine read_group(group, shapes, n, first_line, v, case)
-    type(group_text_t), intent(inout) :: group
-    character(name_length), intent(in) :: shapes(:)   !! names of all shapes
-    integer, intent(inout) :: n(:), first_line(:)     !! of each name: groups so far, line
-    type(group_visitor_t), intent(inout) :: v
-    type(case_t), intent(inout) :: case
-    integer :: g
-
-    call v%start_reading(group)
-    do g = 1, size(groups)
-      if (groups(g) == group%name) exit
-    end do
-    if (g > size(groups)) then
-      call v%report(': unknown group, nearest known: &' &
-                    //nearest_name(printable(group%name), groups))
-      return
-    else if (n(g) > 0 .and. g < first_repeated) then
-      call v%report(': the group is given twice, first on line '//to_text(first_line(g)))
-      return
-    end if
-    if (n(g) == 0) first_line(g) = group%line
-    n(g) = n(g) + 1
-    call visit_group(v, case, groups(g), n(g), shapes)
-    group = v%group   ! remembers which variables are faulty
-  end subroutine read_group
-
-  !> Read, write or describe one group: the n-th of its name.
+  !> Read one group: the n-th of its name.
   subroutine visit_group(v, case, name, n, shapes)
     type(group_visitor_t), intent(inout) :: v
     type(case_t), intent(inout) :: case
@@ -183,7 +174,7 @@ contains
     case default; error stop 'visit_group: a group of the list has no procedure'
     end select
     call v%finish()
-    if (v%reading) call mark_faulty(v, case, name, n)
+    call mark_faulty(v, case, name, n)
   end subroutine visit_group
 
   !> Remember what of a group cannot be relied on, so that later checks leave it alone.
@@ -227,24 +218,6 @@ contains
       faulty = v%group%faulty .or. .not. v%good(variables)
     end function faulty
   end subroutine mark_faulty
-
-  !> Groups that hold required variables and are not there at all.
-  subroutine read_missing_groups(n, v, case)
-    integer, intent(in) :: n(:)
-    type(group_visitor_t), intent(inout) :: v
-    type(case_t), intent(inout) :: case
-    type(group_text_t) :: nothing
-    character(name_length) :: no_shapes(0)
-    integer :: g
-
-    allocate (nothing%assignment(0))
-    do g = 1, 2   ! run and grid
-      if (n(g) > 0) cycle
-      nothing%name = trim(groups(g))
-      call v%start_reading(nothing)
-      call visit_group(v, case, groups(g), 1, no_shapes)
-    end do
-  end subroutine read_missing_groups
 
   !> The names the shapes of the case were given, right or wrong, and those of the stones of
   !! families.
@@ -306,7 +279,7 @@ contains
     call find_idle(list, case, v)
     i = first_of(list, 'grid')
     if (i == 0 .or. case%grid%cells_faulty) return
-    call v%start_reading(list%group(i))
+    call v%start(list%group(i))
     do d = 1, 3
       if (case%grid%cells(d) /= 1 .or. any(case%boundary%faulty(:, d))) cycle
       call v%require('cells', all(case%boundary%kind(:, d) == 'slip') .or. &
@@ -339,7 +312,7 @@ contains
 
     i = first_of(list, 'boundary')
     if (i == 0 .or. .not. has_flow(case%run)) return
-    call v%start_reading(list%group(i))
+    call v%start(list%group(i))
     way_out = any(gives_pressure(side_code(case%boundary%kind)) .or. case%boundary%faulty)
     associate (fluid => case%fluid)
       do d = 1, 3
@@ -363,15 +336,12 @@ contains
     type(namelist_text_t), intent(in) :: list
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
-    type(group_text_t) :: nothing
     character(*), parameter :: light = 'physics = ''light'' '
     integer :: i, d, s
 
-    allocate (nothing%assignment(0))
-    nothing%name = 'fluid'
+    call v%start_empty('fluid')
     i = first_of(list, 'fluid')
-    if (i > 0) nothing = list%group(i)
-    call v%start_reading(nothing)
+    if (i > 0) call v%start(list%group(i))
     associate (fluid => case%fluid)
       call v%require('single_phase', .not. fluid%single_phase, light//'needs a level of the water')
       if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
@@ -384,7 +354,7 @@ contains
     end associate
     i = first_of(list, 'boundary')
     if (i == 0) return
-    call v%start_reading(list%group(i))
+    call v%start(list%group(i))
     do d = 1, 3
       do s = 1, 2
         if (case%boundary%faulty(s, d)) cycle
@@ -434,42 +404,45 @@ contains
   !> Every parameter of a case after defaults, as the text of a case with the same meaning.
   function parameters_text(case) result(text)
     type(case_t), intent(in) :: case
-    character(:), allocatable :: text
+    character(:), allocatable :: text, value
+    type(string_builder_t) :: lines
+    type(case_t) :: copy   ! reading a group in which nothing is given leaves it as it is
     type(group_visitor_t) :: v
-    type(case_t) :: copy   ! what is visited may be changed, though writing never does
     character(name_length) :: no_names(0)
-    integer :: g, i
+    integer :: g, i, k
 
     copy = case
-    do g = 1, size(groups)
-      do i = 1, number_of(copy, groups(g))
-        if (groups(g) == 'shape') then
+    do g = 1, size(group_names)
+      do i = 1, number_of(copy, group_names(g))
+        if (group_names(g) == 'shape') then
           if (copy%shape(i)%member > 1) cycle   ! of a family already written
         end if
-        call v%start_writing(trim(groups(g)))
-        call visit_group(v, copy, groups(g), i, no_names)
+        call v%start_empty(group_names(g))
+        call visit_group(v, copy, group_names(g), i, no_names)
+        call lines%add_line('&'//trim(group_names(g)))
+        do k = 1, v%n
+          value = v%entry(k)%value()
+          if (v%entry(k)%idle .or. len(value) == 0) cycle
+          call lines%add_line('  '//trim(v%entry(k)%name)//' = '//value)
+        end do
+        call lines%add_line('/')
       end do
     end do
-    text = v%written%text()
+    text = lines%text()
   end function parameters_text
 
-  !> What all groups are made of, with the defaults of a case that says nothing.
-  function describe_groups() result(descriptions)
-    type(group_description_t) :: descriptions(size(groups))
-    type(group_visitor_t) :: v
+  !> The entries of a group, with the defaults of a case that says nothing.
+  subroutine list_entries(group, v)
+    character(*), intent(in) :: group
+    type(group_visitor_t), intent(out) :: v
     type(case_t) :: case
     character(name_length) :: no_names(0)
-    integer :: g
 
     call set_empty(case)
     allocate (case%water(1), case%shape(1), case%body(1), case%drop(1))
-    do g = 1, size(groups)
-      call v%start_describing(trim(groups(g)))
-      call visit_group(v, case, groups(g), 1, no_names)
-      descriptions(g) = v%description
-      descriptions(g)%repeated = g >= first_repeated
-    end do
-  end function describe_groups
+    call v%start_empty(group)
+    call visit_group(v, case, group, 1, no_names)
+  end subroutine list_entries
 
   !> How many groups of a name a case has; an unused bed is none.
   pure function number_of(case, group) result(n)

@@ -165,7 +165,7 @@ module case_types_m
     character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(:), allocatable :: checksum           !! of the table
     type(place_t), allocatable :: row(:)            !! of the table
-    real(wp) :: weights(max_drop_shapes) = absent
+    real(wp) :: weights(max_drop_shapes) = [1.0_wp, spread(absent, 1, max_drop_shapes - 1)]
     real(wp) :: position(3) = absent                !! required [m]
     real(wp) :: to(3) = absent                      !! of the last block [m]
     integer :: count = 1

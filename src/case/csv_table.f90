@@ -9,8 +9,8 @@ module csv_table_m
   use errors_m, only: problems_t, to_text
   use file_words_m, only: words_t, read_whole
   use value_text_m, only: parse_real, nearest_name, lower_case, printable, quoted_text, &
-    byte_order_mark, value_ok, value_not_finite, value_too_large
-  use case_file_m, only: is_utf8, utf8_of_latin1
+    value_ok, value_not_finite, value_too_large
+  use text_file_m, only: to_utf8, plain_lines
   implicit none
   private
   public :: csv_table_t, read_table
@@ -38,7 +38,7 @@ contains
     type(problems_t), intent(inout) :: problems
     type(words_t) :: words
     character(1) :: separator
-    integer :: at, last, line, n, n_lines
+    integer :: at, last, line, n, n_lines, i
     integer :: first(max_columns), final(max_columns)
     logical :: quoted
 
@@ -50,16 +50,16 @@ contains
       call problems%add_message(words%problem)
       return
     end if
-    table%text = words%text
-    if (.not. is_utf8(table%text)) table%text = utf8_of_latin1(table%text)
-    n_lines = count_lines(table%text)
+    call to_utf8(words%text)
+    table%text = plain_lines(words%text)
+    n_lines = 0
+    do i = 1, len(table%text)
+      if (table%text(i:i) == new_line('a')) n_lines = n_lines + 1
+    end do
     at = 1
-    if (index(table%text, byte_order_mark) == 1) at = len(byte_order_mark) + 1
-    line = 0
     separator = ','
-    do while (at <= len(table%text))
-      line = line + 1
-      last = end_of_line(table%text, at)
+    do line = 1, n_lines
+      last = at + index(table%text(at:), new_line('a')) - 2
       if (.not. is_empty(table%text(at:last), separator)) then
         if (size(table%name) == 0) separator = separator_of(table%text(at:last))
         call cut_line(table%text(at:last), separator, n, first, final, quoted)
@@ -78,34 +78,9 @@ contains
         end if
       end if
       at = last + 2
-      if (last + 2 <= len(table%text)) then
-        if (table%text(last + 1:last + 2) == achar(13)//achar(10)) at = last + 3
-      end if
     end do
     if (size(table%name) == 0) call problems%add_message('the file is empty')
   end subroutine read_table
-
-  !> At least as many as there are lines.
-  pure function count_lines(text) result(n)
-    character(*), intent(in) :: text
-    integer :: n
-    integer :: i
-
-    n = 1
-    do i = 1, len(text)
-      if (text(i:i) == achar(10) .or. text(i:i) == achar(13)) n = n + 1
-    end do
-  end function count_lines
-
-  !> The last character of the line that begins at `at`.
-  pure function end_of_line(text, at) result(last)
-    character(*), intent(in) :: text
-    integer, intent(in) :: at
-    integer :: last
-
-    last = scan(text(at:), achar(10)//achar(13)) + at - 2
-    if (last < at - 1) last = len(text)
-  end function end_of_line
 
   !> Is there nothing in a line, or a remark?
   pure function is_empty(line, separator) result(yes)

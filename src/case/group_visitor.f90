@@ -1,21 +1,17 @@
-!> One description of a namelist group for three ends: reading its values, writing them out, and
-!! telling the user what the group is made of.
-!!
-!! A `visit_...` procedure names each variable of a group once, what it may be and what it means:
+!> Reads one namelist group. A `visit_...` procedure names each variable of a group once, what it
+!! may be and what it means:
 !!
 !!     call v%real('dt', run%dt, positive('s'), 'largest time step', example='0.005')
 !!
-!! A reading visitor fills the variable from the text if the user gave it and notes what is wrong
-!! with it; a writing visitor appends `dt = 0.01` to its text; a describing visitor lists what it
-!! was given, the value at hand as the default. The names asked for are the known names, so an
-!! unknown variable and its nearest neighbour need no second list.
+!! fills the variable if the user gave it, notes what is wrong with it, and appends an entry. The
+!! entries of a group in which the user gives nothing are what help, schema and the text of all
+!! parameters are made of; their names are the known names, so an unknown variable and its nearest
+!! neighbour need no second list.
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use string_builder_m, only: string_builder_t
   use allowed_values_m, only: allowed_t
-  use description_m, only: variable_t, group_description_t, described, choices, &
-    word_text, words_text, next_word
+  use entries_m, only: entry_t, words_of, choices
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
@@ -29,81 +25,70 @@ module group_visitor_m
   integer, parameter :: slip_of_pen = 2       !! letters by which a misspelt name may differ
 
   type :: group_visitor_t
-    logical :: reading = .false., writing = .false., describing = .false.   !! one of them
-    type(string_builder_t) :: written           !! what a writing visitor has written
-    type(group_description_t) :: description      !! what a describing visitor collects
-    type(problems_t) :: problems           !! what a reading visitor has found
-    type(problems_t) :: passed_over        !! and what it passes over, for warnings
+    type(problems_t) :: problems           !! found in all groups
+    type(problems_t) :: passed_over        !! variables without meaning, for warnings
     type(group_text_t) :: group            !! the group being read
-    integer, private :: n_known = 0
-    character(name_length), private :: known(max_variables) = ''
-    character(:), allocatable, private :: left_out   !! not written: they have no meaning
+    character(:), allocatable :: meaning   !! of the group
+    character(:), allocatable :: ways      !! sets of variables of which it needs one, '|' between
+    integer :: n = 0                       !! entries
+    type(entry_t) :: entry(max_variables)
+    character(:), allocatable, private :: left_out   !! names without meaning
     character(:), allocatable, private :: unsure   !! required and missing, or misspelt, it seems
   contains
-    procedure :: start_reading, start_writing, start_describing, about, finish
+    procedure :: start, start_empty, about, finish
     procedure :: given, good, needed, require, without_meaning, report, pass_over
     procedure :: name, names, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
     procedure, private :: real_value, real_values, integer_value, integer_values
-    procedure, private :: numbers, lookup, fault, count_is, read_number, read_text, put_variable
+    procedure, private :: enter, lookup, fault, read_number, read_text
   end type group_visitor_t
 
 contains
 
-  !> Begin to read a group; a group the user did not write has an empty one in its place.
-  subroutine start_reading(self, group)
+  !> Begin to read a group.
+  subroutine start(self, group)
     class(group_visitor_t), intent(inout) :: self
     type(group_text_t), intent(in) :: group
 
-    self%reading = .true.
     self%group = group
-    self%n_known = 0
-    self%unsure = ' '
-  end subroutine start_reading
-
-  !> Begin to write a group.
-  subroutine start_writing(self, group)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: group
-
-    self%writing = .true.
+    self%n = 0
     self%unsure = ' '
     self%left_out = ' '
-    call self%written%add_line('&'//group)
-  end subroutine start_writing
+  end subroutine start
 
-  !> Begin to describe a group.
-  subroutine start_describing(self, group)
+  !> Begin a group that the user did not write.
+  subroutine start_empty(self, name)
     class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: group
+    character(*), intent(in) :: name
+    type(group_text_t) :: nothing
 
-    self%describing = .true.
-    self%unsure = ' '
-    self%description = group_description_t(name=group)
-    allocate (self%description%variable(max_variables))
-  end subroutine start_describing
+    nothing%name = trim(name)
+    allocate (nothing%assignment(0))
+    call self%start(nothing)
+  end subroutine start_empty
 
-  !> What the group is about, in a line.
-  subroutine about(self, meaning)
+  !> What the group is about, in a line; and, if it can be given in several ways, those.
+  subroutine about(self, meaning, ways)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: meaning
+    character(*), intent(in), optional :: ways   !! as in `shape position|file`
 
-    if (self%describing) self%description%meaning = meaning
+    self%meaning = meaning
+    self%ways = ''
+    if (present(ways)) self%ways = ways
   end subroutine about
 
-  !> End a group: report the variables nobody asked for, or close the group written.
+  !> End a group: report the variables nobody asked for.
   subroutine finish(self)
     class(group_visitor_t), intent(inout) :: self
     character(:), allocatable :: nearest
     integer :: i
 
-    if (self%writing) call self%written%add_line('/')
-    if (.not. self%reading) return
     do i = 1, self%group%n
       associate (name => self%group%assignment(i)%name)
-        if (any(self%known(:self%n_known) == name)) cycle
-        nearest = nearest_name(name, self%known(:self%n_known))
+        if (any(self%entry(:self%n)%name == name)) cycle
+        nearest = nearest_name(name, self%entry(:self%n)%name)
         call self%fault(i, 'unknown variable, nearest known: '//nearest)
         if (edit_distance(name, nearest) <= slip_of_pen) self%unsure = self%unsure//nearest//' '
       end associate
@@ -116,8 +101,7 @@ contains
     character(*), intent(in) :: variable
     logical :: yes
 
-    yes = .false.
-    if (self%reading) yes = self%group%find(variable) > 0
+    yes = self%group%find(variable) > 0
   end function given
 
   !> Is nothing wrong with these variables so far? A default is good, unless the variable is
@@ -126,16 +110,16 @@ contains
     class(group_visitor_t), intent(in) :: self
     character(*), intent(in) :: variables   !! one blank between them
     logical :: yes
-    integer :: first, last, i
+    integer :: w, i
 
     yes = .true.
-    last = -1
-    do while (last < len(variables))
-      call next_word(variables, first, last)
-      i = self%group%find(variables(first:last))
-      if (i > 0) yes = yes .and. .not. self%group%assignment(i)%faulty
-      if (index(self%unsure, ' '//variables(first:last)//' ') > 0) yes = .false.
-    end do
+    associate (words => words_of(variables))
+      do w = 1, size(words)
+        i = self%group%find(words(w))
+        if (i > 0) yes = yes .and. .not. self%group%assignment(i)%faulty
+        if (index(self%unsure, ' '//trim(words(w))//' ') > 0) yes = .false.
+      end do
+    end associate
   end function good
 
   !> Report a required variable that is missing.
@@ -143,16 +127,13 @@ contains
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     character(*), intent(in) :: meaning   !! what it stands for, with its unit
+    character(:), allocatable :: where
 
-    if (.not. self%reading .or. self%group%faulty) return
-    if (self%group%find(variable) > 0) return
-    self%unsure = self%unsure//variable//' '
-    if (self%group%line > 0) then
-      call self%report(' '//variable//': missing, required: '//meaning)
-    else
-      call self%report(' '//variable//': missing, required: '//meaning &
-                     //' (there is no group &'//self%group%name//')')
-    end if
+    if (self%group%faulty .or. self%given(variable)) return
+    self%unsure = self%unsure//trim(variable)//' '
+    where = ''
+    if (self%group%line == 0) where = ' (there is no group &'//self%group%name//')'
+    call self%report(' '//trim(variable)//': missing, required: '//meaning//where)
   end subroutine needed
 
   !> Report what is wrong with a variable unless `ok`; only the first problem of each is reported.
@@ -163,7 +144,7 @@ contains
     character(*), intent(in) :: allowed   !! what is wrong and what is allowed
     integer :: i
 
-    if (ok .or. .not. self%reading) return
+    if (ok) return
     i = self%group%find(variable)
     if (i > 0) then
       call self%fault(i, allowed)
@@ -173,24 +154,23 @@ contains
   end subroutine require
 
   !> Variables that have no meaning if `idle`, because of what was chosen: each that is given is a
-  !! problem, and none is written. To be called before they are read.
+  !! problem, and its entry is idle. To be called before they are read.
   subroutine without_meaning(self, idle, variables, chosen, remedy)
     class(group_visitor_t), intent(inout) :: self
     logical, intent(in) :: idle
     character(*), intent(in) :: variables   !! one blank between them
     character(*), intent(in) :: chosen      !! as in `law = 'constants'`
     character(*), intent(in) :: remedy      !! what is allowed
-    integer :: first, last, i
+    integer :: w, i
 
     if (.not. idle) return
-    if (self%writing) self%left_out = self%left_out//variables//' '
-    if (.not. self%reading) return
-    last = -1
-    do while (last < len(variables))
-      call next_word(variables, first, last)
-      i = self%group%find(variables(first:last))
-      if (i > 0) call self%fault(i, 'has no meaning with '//chosen//'; '//remedy)
-    end do
+    self%left_out = self%left_out//variables//' '
+    associate (words => words_of(variables))
+      do w = 1, size(words)
+        i = self%group%find(words(w))
+        if (i > 0) call self%fault(i, 'has no meaning with '//chosen//'; '//remedy)
+      end do
+    end associate
   end subroutine without_meaning
 
   !> Variables that have no meaning because of the physics that was chosen: those given are passed
@@ -200,21 +180,20 @@ contains
     character(*), intent(in) :: variables   !! one blank between them
     character(*), intent(in) :: chosen      !! as in `physics = 'dry'`
     character(:), allocatable :: names
-    integer :: first, last, i, line, n
+    integer :: w, i, line, n
 
     names = ''
     n = 0
-    last = -1
-    do while (last < len(variables))
-      call next_word(variables, first, last)
-      i = self%group%find(variables(first:last))
-      if (i > 0) then
+    associate (words => words_of(variables))
+      do w = 1, size(words)
+        i = self%group%find(words(w))
+        if (i == 0) cycle
         if (n == 0) line = self%group%assignment(i)%line
         if (n > 0) names = names//', '
-        names = names//variables(first:last)
+        names = names//trim(words(w))
         n = n + 1
-      end if
-    end do
+      end do
+    end associate
     if (n > 0) call self%passed_over%add_message('&'//self%group%name//' '//names//': ' &
       //trim(merge('has ', 'have', n == 1))//' no meaning with '//chosen//', passed over', line)
   end subroutine pass_over
@@ -224,7 +203,6 @@ contains
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: what
 
-    if (.not. self%reading) return
     if (self%group%line > 0) then
       call self%problems%add_message('&'//self%group%name//what, self%group%line)
     else
@@ -246,21 +224,6 @@ contains
     call self%real_values(variable, values, allowed, meaning, example, required)
     x = values(1)
   end subroutine real_value
-
-  !> As many real numbers as `x` has elements, or from `allowed%fewest` on; those not given stay.
-  subroutine real_values(self, variable, x, allowed, meaning, example, required)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable
-    real(wp), intent(inout) :: x(:)
-    type(allowed_t), intent(in) :: allowed
-    character(*), intent(in) :: meaning, example
-    logical, intent(in), optional :: required
-    type(variable_t) :: entry
-
-    entry = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, required)
-    entry%allowed = allowed
-    call self%numbers(entry, .false., x)
-  end subroutine real_values
 
   !> A whole number.
   subroutine integer_value(self, variable, n, allowed, meaning, example, required)
@@ -285,49 +248,40 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: entry
     real(wp) :: values(size(n))
 
-    entry = described(variable, 'number', to_text(n), meaning, example, required)
-    entry%allowed = allowed
     values = n
-    call self%numbers(entry, .true., values)
+    call self%real_values(variable, values, allowed, meaning, example, required)
     n = nint(values)
   end subroutine integer_values
 
-  !> Numbers of either kind.
-  subroutine numbers(self, entry, whole, x)
+  !> As many numbers as `x` has elements, or from `allowed%fewest` on; those not given stay.
+  subroutine real_values(self, variable, x, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
-    type(variable_t), intent(inout) :: entry
-    logical, intent(in) :: whole
+    character(*), intent(in) :: variable
     real(wp), intent(inout) :: x(:)
-    character(:), allocatable :: meaning, problem
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
+    character(:), allocatable :: problem
     real(wp) :: values(size(x))
-    integer :: i, j, fewest
+    integer :: i, j
 
-    if (.not. self%reading) then
-      entry%most = size(x)
-      call self%put_variable(entry)
-      return
+    call self%enter(variable, 'number', meaning, example, required)
+    self%entry(self%n)%allowed = allowed
+    self%entry(self%n)%most = size(x)
+    i = self%lookup()
+    if (i > 0) then
+      values = x
+      do j = 1, self%group%assignment(i)%n
+        call self%read_number(i, j, allowed%whole, values(j))
+      end do
+      problem = allowed%problem(pack(values, is_given(values)))
+      if (len(problem) > 0) call self%fault(i, problem)
+      if (self%good(variable)) x = values
     end if
-    meaning = entry%meaning
-    if (.not. whole) meaning = meaning//' ['//entry%allowed%unit//']'
-    i = self%lookup(entry%name, meaning, entry%required)
-    if (i == 0) return
-    fewest = merge(entry%allowed%fewest, size(x), entry%allowed%fewest > 0)
-    if (.not. self%count_is(i, fewest, size(x))) return
-    values = x
-    do j = 1, self%group%assignment(i)%n
-      call self%read_number(i, j, whole, values(j))
-    end do
-    if (.not. self%good(entry%name)) return
-    problem = entry%allowed%problem(pack(values, is_given(values)))
-    if (len(problem) > 0) then
-      call self%fault(i, problem)
-    else
-      x = values
-    end if
-  end subroutine numbers
+    self%entry(self%n)%number = pack(x, is_given(x))
+  end subroutine real_values
 
   !> A logical; its example is what it is not by default.
   subroutine logical_value(self, variable, flag, meaning)
@@ -337,19 +291,15 @@ contains
     character(*), intent(in) :: meaning
     integer :: i, info
 
-    if (.not. self%reading) then
-      call self%put_variable(described(variable, 'logical', to_text(flag), meaning, &
-                                       to_text(.not. flag)))
-      return
+    call self%enter(variable, 'logical', meaning, to_text(.not. flag))
+    i = self%lookup()
+    if (i > 0) then
+      associate (value => self%group%assignment(i)%value(1))
+        call parse_logical(value%text, flag, info)
+        if (value%quoted .or. info /= value_ok) call self%fault(i, 'must be .true. or .false.')
+      end associate
     end if
-    i = self%lookup(variable, meaning)
-    if (i == 0) return
-    if (.not. self%count_is(i, 1, 1)) return
-    associate (value => self%group%assignment(i)%value(1))
-      call parse_logical(value%text, flag, info)
-      if (value%quoted) info = value_not_whole
-    end associate
-    if (info /= value_ok) call self%fault(i, 'must be .true. or .false.')
+    self%entry(self%n)%text = to_text(flag)
   end subroutine logical_value
 
   !> Text of any length.
@@ -359,19 +309,14 @@ contains
     character(:), allocatable, intent(inout) :: text
     character(*), intent(in) :: meaning, example
     integer :: i
-    logical :: ok
 
-    if (.not. self%reading) then
-      call self%put_variable(described(variable, 'text', quoted_text(text), meaning, example))
-      return
+    call self%enter(variable, 'text', meaning, example)
+    i = self%lookup()
+    if (i > 0) call self%read_text(i, text)
+    if (i > 0 .and. sanitise(text) /= text) then
+      call self%fault(i, 'must hold no control characters')
     end if
-    i = self%lookup(variable, meaning)
-    if (i == 0) return
-    if (.not. self%count_is(i, 1, 1)) return
-    call self%read_text(i, 1, ok)
-    if (.not. ok) return
-    text = self%group%assignment(i)%value(1)%text
-    if (sanitise(text) /= text) call self%fault(i, 'must hold no control characters')
+    self%entry(self%n)%text = quoted_text(text)
   end subroutine text_value
 
   !> The name of something the user made up: letters, digits and `_ - .`, at most `name_length`.
@@ -397,32 +342,23 @@ contains
     logical, intent(in), optional :: required
     character(*), parameter :: allowed = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
-    type(variable_t) :: entry
+    character(:), allocatable :: word
     integer :: i, j
-    logical :: ok
 
-    if (.not. self%reading) then
-      entry = described(variable, 'name', words_text(words), meaning, example, required)
-      entry%most = size(words)
-      call self%put_variable(entry)
-      return
-    end if
-    i = self%lookup(variable, meaning, required)
-    if (i == 0) return
-    if (.not. self%count_is(i, 1, size(words))) return
-    do j = 1, self%group%assignment(i)%n
-      call self%read_text(i, j, ok)
-      if (.not. ok) return
-      associate (text => self%group%assignment(i)%value(j)%text)
-        if (len(text) == 0 .or. len(text) > name_length .or. verify(text, allowed) > 0 &
-            .or. scan(text//'.', '.') == 1) then
-          call self%fault(i, 'a name has 1 to '//to_text(name_length) &
-                          //' letters, digits or _ - . and does not begin with a point')
-          return
-        end if
-        words(j) = text
-      end associate
+    call self%enter(variable, 'name', meaning, example, required)
+    self%entry(self%n)%most = size(words)
+    self%entry(self%n)%allowed%fewest = 1
+    i = self%lookup()
+    do j = 1, merge(self%group%assignment(max(i, 1))%n, 0, i > 0)
+      word = ''
+      call self%read_text(i, word, j)
+      if (len(word) == 0 .or. len(word) > name_length .or. verify(word, allowed) > 0 &
+          .or. scan(word//'.', '.') == 1) call self%fault(i, 'a name has 1 to ' &
+        //to_text(name_length)//' letters, digits or _ - . and does not begin with a point')
+      if (.not. self%good(variable)) exit
+      words(j) = word
     end do
+    self%entry(self%n)%text = choices(words)
   end subroutine names
 
   !> One of the words in `allowed`; those this version cannot do are refused as such.
@@ -433,62 +369,72 @@ contains
     character(*), intent(in) :: allowed   !! the words, one blank between them
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: entry
+    character(:), allocatable :: text
     integer :: i
-    logical :: ok
 
-    if (.not. self%reading) then
-      entry = described(variable, 'choice', word_text(word), meaning, example, required)
-      entry%choices = allowed
-      call self%put_variable(entry)
-      return
+    call self%enter(variable, 'choice', meaning, example, required)
+    self%entry(self%n)%choices = allowed
+    i = self%lookup()
+    if (i > 0) then
+      text = ''
+      call self%read_text(i, text)
+      if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. index(text, ' ') > 0 &
+          .or. len(text) == 0) call self%fault(i, 'unknown, must be one of ' &
+        //choices(words_of(allowed)))
+      if (self%good(variable)) word = text
     end if
-    i = self%lookup(variable, meaning, required)
-    if (i == 0) return
-    if (.not. self%count_is(i, 1, 1)) return
-    call self%read_text(i, 1, ok)
-    if (.not. ok) return
-    associate (text => self%group%assignment(i)%value(1)%text)
-      if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. scan(text//' ', ' ') <= len(text) &
-          .or. len(text) == 0) then
-        call self%fault(i, 'unknown, must be one of '//choices(allowed))
-      else
-        word = text
-      end if
-    end associate
+    self%entry(self%n)%text = choices([word])
   end subroutine option
 
-  !> Write a variable that has a value, or add it to the description.
-  subroutine put_variable(self, variable)
+  !> Append the entry of a variable that is about to be read.
+  subroutine enter(self, variable, kind, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
-    type(variable_t), intent(in) :: variable
-
-    if (self%writing) then
-      if (len(variable%value) == 0 .or. index(self%left_out, ' '//variable%name//' ') > 0) return
-      call self%written%add_line('  '//variable%name//' = '//variable%value)
-    else
-      self%description%n = self%description%n + 1
-      self%description%variable(self%description%n) = variable
-    end if
-  end subroutine put_variable
-
-  !> Number of the assignment to a variable, 0 if the user gave none (a problem if it is required)
-  !! or it is damaged.
-  function lookup(self, variable, meaning, required) result(i)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable
-    character(*), intent(in) :: meaning   !! with the unit
+    character(*), intent(in) :: variable, kind, meaning
+    character(*), intent(in) :: example   !! its value, or assignments with this one as the last
     logical, intent(in), optional :: required
-    integer :: i
 
-    self%n_known = self%n_known + 1
-    self%known(self%n_known) = variable
-    if (present(required)) then
-      if (required) call self%needed(variable, meaning)
-    end if
-    i = self%group%find(variable)
-    if (i == 0) return
-    if (self%group%assignment(i)%faulty) i = 0
+    self%n = self%n + 1
+    self%entry(self%n) = entry_t(name=variable, kind=kind)
+    associate (new => self%entry(self%n))
+      new%meaning = meaning
+      new%example = example
+      if (index(example, ' = ') == 0) new%example = trim(variable)//' = '//example
+      new%choices = ''
+      new%idle = index(self%left_out, ' '//trim(variable)//' ') > 0
+      if (present(required)) new%required = required
+    end associate
+  end subroutine enter
+
+  !> Number of the assignment to the last variable entered; 0 if the user gave none (a problem if
+  !! it is required), or it is damaged or has a wrong number of values.
+  function lookup(self) result(i)
+    class(group_visitor_t), intent(inout) :: self
+    integer :: i
+    character(:), allocatable :: what
+    integer :: j, fewest
+
+    associate (entry => self%entry(self%n))
+      if (entry%required) call self%needed(entry%name, entry%with_unit())
+      i = self%group%find(entry%name)
+      if (i == 0) return
+      if (.not. self%good(entry%name)) i = 0
+      if (i == 0) return
+      fewest = merge(entry%allowed%fewest, entry%most, entry%allowed%fewest > 0)
+      associate (a => self%group%assignment(i))
+        if (a%n >= fewest .and. a%n <= entry%most) return
+        what = to_text(fewest)
+        if (entry%most > fewest) what = what//' to '//to_text(entry%most)
+        what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//' given, '//what &
+          //' needed'
+        do j = 2, a%n
+          if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
+          what = what//'; is an ''='' missing after '//printable(a%value(j)%text)//'?'
+          exit
+        end do
+      end associate
+    end associate
+    call self%fault(i, what)
+    i = 0
   end function lookup
 
   !> Note what is wrong with assignment i; only the first problem of each is reported.
@@ -505,30 +451,6 @@ contains
       a%faulty = .true.
     end associate
   end subroutine fault
-
-  !> Has assignment i the right number of values?
-  function count_is(self, i, least, most) result(yes)
-    class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i, least, most
-    logical :: yes
-    character(:), allocatable :: what
-    integer :: j
-
-    associate (a => self%group%assignment(i))
-      yes = a%n >= least .and. a%n <= most
-      if (yes) return
-      what = to_text(least)
-      if (most > least) what = what//' to '//to_text(most)
-      what = ' given, '//what//' needed'
-      what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//what
-      do j = 2, a%n
-        if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
-        what = what//'; is an ''='' missing after '//printable(a%value(j)%text)//'?'
-        exit
-      end do
-    end associate
-    call self%fault(i, what)
-  end function count_is
 
   !> Value j of assignment i as a number.
   subroutine read_number(self, i, j, whole, x)
@@ -560,16 +482,21 @@ contains
     if (info /= value_ok) call self%fault(i, must//what)
   end subroutine read_number
 
-  !> Is value j of assignment i a quoted text?
-  subroutine read_text(self, i, j, ok)
+  !> A value of assignment i, the first by default, which must be a quoted text.
+  subroutine read_text(self, i, text, j)
     class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i, j
-    logical, intent(out) :: ok
+    integer, intent(in) :: i
+    character(:), allocatable, intent(inout) :: text   !! stays where the value is none
+    integer, intent(in), optional :: j
+    integer :: at
 
-    associate (a => self%group%assignment(i))
-      ok = a%value(j)%quoted
-      if (.not. ok) then
-        call self%fault(i, 'text needs quotes, '//quoted_text(printable(a%value(j)%text)))
+    at = 1
+    if (present(j)) at = j
+    associate (value => self%group%assignment(i)%value(at))
+      if (value%quoted) then
+        text = value%text
+      else
+        call self%fault(i, 'text needs quotes, '//quoted_text(printable(value%text)))
       end if
     end associate
   end subroutine read_text

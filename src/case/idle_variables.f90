@@ -8,7 +8,7 @@ module idle_variables_m
   use errors_m, only: to_text
   use case_types_m, only: case_t, has_flow
   use namelist_text_m, only: namelist_text_t
-  use description_m, only: next_word
+  use entries_m, only: words_of
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: side_name
   implicit none
@@ -17,85 +17,68 @@ module idle_variables_m
 
 contains
 
-  !> Look through all groups of a case that has been read.
+  !> Look through all groups of a case that has been read: one warning for all groups of a name
+  !! without a meaning, then one for each group with variables without one.
   subroutine find_idle(list, case, v)
     type(namelist_text_t), intent(inout) :: list
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
-    integer :: i
+    character(:), allocatable :: chosen, groups, subject
+    integer :: i, k, n, line
 
-    select case (case%run%physics)
-    case ('dry'); call pass_over_groups(list, 'water numerics', 'physics = ''dry''', v)
-    case ('light'); call pass_over_groups(list, 'water numerics', 'physics = ''light''', v)
-    case ('fluid')
-      call pass_over_groups(list, 'contact start shape body drop', 'physics = ''fluid''', v)
-    case default   ! all groups count
-    end select
+    chosen = 'physics = '''//trim(case%run%physics)//''''
+    groups = ''
+    if (case%run%physics == 'fluid') groups = 'contact start shape body drop'
+    if (any(case%run%physics == ['dry  ', 'light'])) groups = 'water numerics'
+    associate (names => words_of(groups))
+      do k = 1, size(names)
+        n = 0
+        do i = list%n, 1, -1
+          if (list%group(i)%name /= names(k)) cycle
+          n = n + 1
+          line = list%group(i)%line
+        end do
+        subject = '&'//trim(names(k))//': has'
+        if (n > 1) subject = to_text(n)//' groups &'//trim(names(k))//': have'
+        if (n > 0) call v%passed_over%add_message(subject//' no meaning with '//chosen &
+          //', passed over', line)
+      end do
+    end associate
     do i = 1, list%n
-      call v%start_reading(list%group(i))
-      select case (case%run%physics)
-      case ('dry'); call pass_over_in_dry(list%group(i)%name, case, v)
-      case ('light'); call pass_over_in_light(list%group(i)%name, v)
-      case ('fluid'); call pass_over_in_fluid(list%group(i)%name, case, v)
-      case default
-        if (list%group(i)%name == 'shape') call v%pass_over('drag_coefficient', &
-          'physics = '''//trim(case%run%physics)//'''')
-      end select
-      if (list%group(i)%name == 'water' .and. case%fluid%single_phase &
-          .and. has_flow(case%run)) call v%report( &
-        ': has no meaning with &fluid single_phase = .true.; the liquid fills the whole tank')
+      call v%start(list%group(i))
+      call v%pass_over(idle_variables(list%group(i)%name, case), chosen)
+      if (list%group(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
+        call v%report(': has no meaning with &fluid single_phase = .true.; the liquid fills the ' &
+          //'whole tank')
+      end if
       list%group(i) = v%group
     end do
   end subroutine find_idle
 
-  !> Blocks alone: of the fluid only gravity acts.
-  subroutine pass_over_in_dry(group, case, v)
+  !> Variables of a group without a meaning in the physics of the case, one blank between them:
+  !! 'dry' has of the fluid only gravity; 'light' a water of given density, level and current;
+  !! without blocks nothing settles, nothing rubs on a slippery wall, and only a bed is solid.
+  pure function idle_variables(group, case) result(names)
     character(*), intent(in) :: group
     type(case_t), intent(in) :: case
-    type(group_visitor_t), intent(inout) :: v
-    character(*), parameter :: chosen = 'physics = ''dry'''
+    character(:), allocatable :: names
 
-    select case (group)
-    case ('run'); call v%pass_over('cfl_max', chosen)
-    case ('boundary'); call v%pass_over(velocities_of('inflow', case), chosen)
-    case ('fluid'); call v%pass_over('liquid_density liquid_viscosity gas_density gas_viscosity ' &
-      //'water_level surface_tension single_phase velocity initial_state', chosen)
-    case ('contact'); call v%pass_over('lubrication', chosen)
-    case ('shape'); call v%pass_over('drag_coefficient', chosen)
+    names = ''
+    select case (trim(case%run%physics)//' '//group)
+    case ('dry run', 'light run'); names = 'cfl_max'
+    case ('fluid run'); names = 'stop_when_settled rest_speed rest_time'
+    case ('dry boundary'); names = velocities_of('inflow', case)
+    case ('fluid boundary'); names = velocities_of('slip', case)
+    case ('dry fluid'); names = 'liquid_density liquid_viscosity gas_density gas_viscosity ' &
+      //'water_level surface_tension single_phase velocity initial_state'
+    case ('light fluid'); names = 'liquid_viscosity gas_density gas_viscosity surface_tension ' &
+      //'initial_state'
+    case ('fluid numerics'); if (len_trim(case%bed%file) == 0) names = 'solid_fraction subcells'
+    case ('dry contact', 'light contact'); names = 'lubrication'
+    case ('dry shape', 'coupled shape'); names = 'drag_coefficient'
     case default   ! all of it counts, or nothing
     end select
-  end subroutine pass_over_in_dry
-
-  !> A given water: its density, level and current count.
-  subroutine pass_over_in_light(group, v)
-    character(*), intent(in) :: group
-    type(group_visitor_t), intent(inout) :: v
-    character(*), parameter :: chosen = 'physics = ''light'''
-
-    select case (group)
-    case ('run'); call v%pass_over('cfl_max', chosen)
-    case ('fluid'); call v%pass_over('liquid_viscosity gas_density gas_viscosity ' &
-      //'surface_tension initial_state', chosen)
-    case ('contact'); call v%pass_over('lubrication', chosen)
-    case default   ! all of it counts, or nothing
-    end select
-  end subroutine pass_over_in_light
-
-  !> No blocks: nothing settles, nothing rubs on a slippery wall, only a bed is solid.
-  subroutine pass_over_in_fluid(group, case, v)
-    character(*), intent(in) :: group
-    type(case_t), intent(in) :: case
-    type(group_visitor_t), intent(inout) :: v
-    character(*), parameter :: chosen = 'physics = ''fluid'''
-
-    select case (group)
-    case ('run'); call v%pass_over('stop_when_settled rest_speed rest_time', chosen)
-    case ('boundary'); call v%pass_over(velocities_of('slip', case), chosen)
-    case ('numerics')
-      if (len_trim(case%bed%file) == 0) call v%pass_over('solid_fraction subcells', chosen)
-    case default   ! all of it counts, or nothing
-    end select
-  end subroutine pass_over_in_fluid
+  end function idle_variables
 
   !> The names of the velocities of all sides of a kind, one blank between them.
   pure function velocities_of(kind, case) result(names)
@@ -110,33 +93,7 @@ contains
         if (case%boundary%kind(s, d) == kind) names = names//' '//side_name(s, d)//'_velocity'
       end do
     end do
-    names = adjustl(names)
-    names = trim(names)
+    names = trim(adjustl(names))
   end function velocities_of
-
-  !> Whole groups without a meaning: one warning for all of a name.
-  subroutine pass_over_groups(list, names, chosen, v)
-    type(namelist_text_t), intent(in) :: list
-    character(*), intent(in) :: names    !! one blank between them
-    character(*), intent(in) :: chosen   !! as in `physics = 'dry'`
-    type(group_visitor_t), intent(inout) :: v
-    character(:), allocatable :: subject
-    integer :: first, last, line, n, i
-
-    last = -1
-    do while (last < len(names))
-      call next_word(names, first, last)
-      n = 0
-      do i = list%n, 1, -1
-        if (list%group(i)%name /= names(first:last)) cycle
-        n = n + 1
-        line = list%group(i)%line
-      end do
-      if (n == 0) cycle
-      subject = '&'//names(first:last)//': has'
-      if (n > 1) subject = to_text(n)//' groups &'//names(first:last)//': have'
-      call v%passed_over%add_message(subject//' no meaning with '//chosen//', passed over', line)
-    end do
-  end subroutine pass_over_groups
 
 end module idle_variables_m

@@ -64,7 +64,9 @@ contains
     type(problems_t), intent(inout) :: problems
     type(cursor_t) :: cursor
     type(group_text_t) :: group
-    logical :: stray_reported
+    character(:), allocatable :: ended
+    integer :: length
+    logical :: stray_reported   ! text where only a group may stand
 
     cursor = start_of(text)
     allocate (list%group(8))
@@ -76,35 +78,25 @@ contains
         call read_group(cursor, group, problems)
         if (len(group%name) > 0) call append_group(list, group)
         stray_reported = .false.
-      else
-        if (.not. stray_reported) call report_stray(cursor, list, problems)
-        stray_reported = .true.
-        call skip_line(cursor)
+        cycle
       end if
+      ended = ''
+      if (list%n > 0) ended = ' ; &'//list%group(list%n)%name//' has ended with its ''/'''
+      length = index(cursor%text(cursor%at:), line_feed) - 1
+      if (.not. stray_reported) call problems%add_message('text outside the groups: ' &
+        //printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))//ended, cursor%line)
+      stray_reported = .true.
+      call skip_line(cursor)
     end do
   end subroutine cut_groups
-
-  !> Text where only a group may stand.
-  subroutine report_stray(cursor, list, problems)
-    type(cursor_t), intent(in) :: cursor
-    type(namelist_text_t), intent(in) :: list
-    type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: message
-    integer :: length
-
-    length = index(cursor%text(cursor%at:), line_feed) - 1
-    message = printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))
-    message = 'text outside the groups: '//message
-    if (list%n > 0) message = message//' ; &'//list%group(list%n)%name//' has ended with its ''/'''
-    call problems%add_message(message, cursor%line)
-  end subroutine report_stray
 
   !> Read one group from its '&' to its '/'.
   subroutine read_group(cursor, group, problems)
     type(cursor_t), intent(inout) :: cursor
     type(group_text_t), intent(out) :: group
     type(problems_t), intent(inout) :: problems
-    logical :: comma   ! the last thing read is a comma
+    logical :: comma    ! the last thing read is a comma
+    logical :: valued   ! the last assignment has a value already
 
     group%line = cursor%line
     cursor%at = cursor%at + 1
@@ -123,9 +115,11 @@ contains
       call skip_blanks(cursor)
       if (group_ends(cursor, group, problems)) exit
       if (next(cursor) == ',') then
-        if (comma .or. .not. has_value(group)) then
-          call report(cursor, group, 'nothing in front of a comma; write every value', problems)
-        end if
+        valued = .false.
+        if (group%n > 0) valued = group%assignment(group%n)%n > 0 .or. &
+          group%assignment(group%n)%faulty
+        if (comma .or. .not. valued) call report(cursor, group, &
+          'nothing in front of a comma; write every value', problems)
         comma = .true.
         cursor%at = cursor%at + 1
         cycle
@@ -479,14 +473,5 @@ contains
     end do
     text = printable(text)
   end function assignment_shown
-
-  !> Has the last assignment a value already?
-  pure function has_value(group) result(yes)
-    type(group_text_t), intent(in) :: group
-    logical :: yes
-
-    yes = .false.
-    if (group%n > 0) yes = group%assignment(group%n)%n > 0 .or. group%assignment(group%n)%faulty
-  end function has_value
 
 end module namelist_text_m

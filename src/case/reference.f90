@@ -1,8 +1,9 @@
 !> The reference of the case file: each variable of each group by the reading procedures.
 module reference_m
-  use description_m, only: group_description_t, variable_t, choices
+  use entries_m, only: entry_t, choices, words_of
+  use group_visitor_m, only: group_visitor_t
   use string_builder_m, only: string_builder_t
-  use case_input_m, only: describe_groups
+  use case_input_m, only: group_names, is_repeated, list_entries
   use errors_m, only: problems_t, to_text
   use schema_m, only: schema_text
   use value_text_m, only: lower_case, nearest_name, printable
@@ -21,63 +22,51 @@ contains
     character(*), intent(in) :: topic
     type(problems_t), intent(inout) :: problems   !! gets an unknown topic
     character(:), allocatable :: text
-    type(group_description_t), allocatable :: groups(:)
+    type(group_visitor_t) :: v
+    character(12) :: name
     integer :: g
 
-    groups = describe_groups()
+    text = ''
     select case (topic)
-    case (''); text = list_text(groups)
-    case ('markdown'); text = page_text(groups)
-    case ('json'); text = schema_text(groups)
-    case default
-      text = ''
-      do g = 1, size(groups)
-        if (groups(g)%name == lower_case(topic)) text = group_text(groups(g))
+    case ('')
+      text = 'Groups of a case (* any number); --help GROUP lists the variables:'//new_line('a')
+      do g = 1, size(group_names)
+        call list_entries(group_names(g), v)
+        name = group_names(g)(:12)
+        if (is_repeated(g)) name = trim(name)//' *'
+        text = text//'  '//name//v%meaning//new_line('a')
       end do
-      if (len(text) == 0) then
-        call problems%add_message('unknown group '''//printable(topic)//'''; the nearest is ' &
-          //nearest_name(printable(topic), groups%name)//' (--help lists all)')
-      end if
+    case ('markdown'); text = page_text()
+    case ('json'); text = schema_text()
+    case default
+      do g = 1, size(group_names)
+        if (group_names(g) == lower_case(topic)) text = group_text(g)
+      end do
+      if (len(text) == 0) call problems%add_message('unknown group '''//printable(topic) &
+        //'''; the nearest is '//nearest_name(printable(topic), group_names) &
+        //' (--help lists all)')
     end select
   end function reference_text
 
-  !> All groups, a line each.
-  pure function list_text(groups) result(text)
-    type(group_description_t), intent(in) :: groups(:)
-    character(:), allocatable :: text
-    type(string_builder_t) :: lines
-    character(:), allocatable :: name
-    integer :: g
-
-    call lines%add_line('Groups of a case (* any number); --help GROUP lists the variables:')
-    do g = 1, size(groups)
-      name = trim(groups(g)%name)
-      if (groups(g)%repeated) name = name//' *'
-      call lines%add_line('  '//name//repeat(' ', 12 - len(name))//groups(g)%meaning)
-    end do
-    text = lines%text()
-  end function list_text
-
   !> All variables of a group, a paragraph each.
-  pure function group_text(group) result(text)
-    type(group_description_t), intent(in) :: group
+  function group_text(g) result(text)
+    integer, intent(in) :: g
     character(:), allocatable :: text
     type(string_builder_t) :: lines
+    type(group_visitor_t) :: v
     integer :: i, indent
 
-    call lines%add_line('&'//trim(group%name)//': '//group%meaning)
-    if (group%repeated) call lines%add_line('A case may hold any number of these groups.')
-    indent = 0
-    do i = 1, group%n
-      indent = max(indent, len(group%variable(i)%name) + 4)
-    end do
-    do i = 1, group%n
-      associate (variable => group%variable(i))
+    call list_entries(group_names(g), v)
+    call lines%add_line('&'//v%group%name//': '//v%meaning)
+    if (is_repeated(g)) call lines%add_line('A case may hold any number of these groups.')
+    indent = maxval(len_trim(v%entry(:v%n)%name)) + 4
+    do i = 1, v%n
+      associate (entry => v%entry(i))
         call lines%add_line('')
-        call lines%add_line('  '//variable%name//repeat(' ', indent - 2 - len(variable%name)) &
-          //wrapped(values(variable, with_unit=.true.)//'; '//default_words(variable), indent))
-        call lines%add_line(repeat(' ', indent)//wrapped(variable%meaning, indent))
-        call lines%add_line(repeat(' ', indent)//'example: '//variable%example)
+        call lines%add_line('  '//entry%name(:indent - 2) &
+          //wrapped(values(entry, with_unit=.true.)//'; '//default_words(entry), indent))
+        call lines%add_line(repeat(' ', indent)//wrapped(entry%meaning, indent))
+        call lines%add_line(repeat(' ', indent)//'example: '//entry%example)
       end associate
     end do
     text = lines%text()
@@ -102,106 +91,89 @@ contains
   end function wrapped
 
   !> The page with a table for each group.
-  pure function page_text(groups) result(text)
-    type(group_description_t), intent(in) :: groups(:)
+  function page_text() result(text)
     character(:), allocatable :: text
     type(string_builder_t) :: lines
+    type(group_visitor_t) :: v
+    character(:), allocatable :: default
     integer :: g, i
+    character(*), parameter :: head(*) = [character(98) :: &
+      '# The case file: every group and variable', &
+      '', &
+      'Written by `make reference` from the lines of `src/case` that read and check a case; do ' &
+      //'not edit.', &
+      '`./mics --help GROUP` prints the same. `docs/mics-case.schema.json` holds it as a JSON ' &
+      //'schema: the', &
+      'page of `mics-tools report` takes the defaults from it, and Python checks a case by it ' &
+      //'with the', &
+      'packages f90nml and jsonschema:', &
+      '', &
+      '```python', &
+      'import json, f90nml, jsonschema', &
+      'case = f90nml.read(''input/blocks.nml'')', &
+      'case = {k: [dict(g) for g in v] if isinstance(v, list) else dict(v)', &
+      '        for k, v in case.items()}', &
+      'jsonschema.validate(case, json.load(open(''docs/mics-case.schema.json'')))', &
+      '```', &
+      '', &
+      'SI units; angles in degrees where a name ends in `_deg`.']
 
-    call lines%add_line('# The case file: every group and variable')
-    call lines%add_line('')
-    call lines%add_line('Written by `make reference` from the lines of `src/case` that read and ' &
-      //'check a case; do not edit.')
-    call lines%add_line('`./mics --help GROUP` prints the same. `docs/mics-case.schema.json` ' &
-      //'holds it as a JSON schema: the')
-    call lines%add_line('page of `mics-tools report` takes the defaults from it, and ' &
-      //'Python checks a case by it with the')
-    call lines%add_line('packages f90nml and jsonschema:')
-    call lines%add_line('')
-    call lines%add_line('```python')
-    call lines%add_line('import json, f90nml, jsonschema')
-    call lines%add_line("case = f90nml.read('input/blocks.nml')")
-    call lines%add_line('case = {k: [dict(g) for g in v] if isinstance(v, list) else dict(v)')
-    call lines%add_line('        for k, v in case.items()}')
-    call lines%add_line("jsonschema.validate(case, json.load(open('docs/mics-case.schema.json')))")
-    call lines%add_line('```')
-    call lines%add_line('')
-    call lines%add_line('SI units; angles in degrees where a name ends in `_deg`.')
-    do g = 1, size(groups)
-      call lines%add_line('')
-      call lines%add_line('## &'//trim(groups(g)%name))
-      call lines%add_line('')
-      call lines%add(capital(groups(g)%meaning))
-      if (groups(g)%repeated) call lines%add('; a case may hold any number of these groups')
-      call lines%add_line('.')
-      call lines%add_line('')
+    do i = 1, size(head)
+      call lines%add_line(trim(head(i)))
+    end do
+    do g = 1, size(group_names)
+      call list_entries(group_names(g), v)
+      call lines%add_line(new_line('a')//'## &'//v%group%name//new_line('a'))
+      text = v%meaning
+      if (text(1:1) >= 'a') text(1:1) = achar(iachar(text(1:1)) - 32)
+      if (is_repeated(g)) text = text//'; a case may hold any number of these groups'
+      call lines%add_line(text//'.'//new_line('a'))
       call lines%add_line('| variable | values | default | unit | meaning | example |')
       call lines%add_line('|---|---|---|---|---|---|')
-      do i = 1, groups(g)%n
-        call lines%add_line(table_row(groups(g)%variable(i)))
+      do i = 1, v%n
+        associate (entry => v%entry(i))
+          default = default_words(entry)
+          if (index(default, 'default ') == 1) default = '`'//entry%value()//'`'
+          call lines%add_line('| `'//trim(entry%name)//'` | '//values(entry, with_unit=.false.) &
+            //' | '//default//' | '//trim(entry%allowed%unit)//' | '//entry%meaning//' | `' &
+            //entry%example//'` |')
+        end associate
       end do
     end do
     text = lines%text()
   end function page_text
 
-  !> A sentence with its first letter a capital one.
-  pure function capital(text) result(sentence)
-    character(*), intent(in) :: text
-    character(:), allocatable :: sentence
-
-    sentence = text
-    if (text(1:1) >= 'a' .and. text(1:1) <= 'z') sentence(1:1) = achar(iachar(text(1:1)) - 32)
-  end function capital
-
-  !> A variable as a row of a table.
-  pure function table_row(variable) result(row)
-    type(variable_t), intent(in) :: variable
-    character(:), allocatable :: row
-    character(:), allocatable :: default, unit
-
-    default = default_words(variable)
-    if (.not. variable%required .and. len(variable%value) > 0) default = '`'//variable%value//'`'
-    unit = ''
-    if (variable%kind == 'number') unit = variable%allowed%unit
-    row = '| `'//variable%name//'` | '//values(variable, with_unit=.false.)//' | '//default//' | ' &
-      //unit//' | '//variable%meaning//' | `'//variable%example//'` |'
-  end function table_row
-
   !> The default, or why there is none.
-  pure function default_words(variable) result(words)
-    type(variable_t), intent(in) :: variable
+  pure function default_words(entry) result(words)
+    type(entry_t), intent(in) :: entry
     character(:), allocatable :: words
 
-    if (variable%required) then
-      words = 'required'
-    else if (len(variable%value) > 0) then
-      words = 'default '//variable%value
-    else
-      words = 'no default'
-    end if
+    words = 'default '//entry%value()
+    if (len(entry%value()) == 0) words = 'no default'
+    if (entry%required) words = 'required'
   end function default_words
 
   !> What a variable may be.
-  pure function values(variable, with_unit) result(words)
-    type(variable_t), intent(in) :: variable
+  pure function values(entry, with_unit) result(words)
+    type(entry_t), intent(in) :: entry
     logical, intent(in) :: with_unit
     character(:), allocatable :: words
 
-    select case (variable%kind)
-    case ('choice'); words = choices(variable%choices)
+    select case (entry%kind)
+    case ('choice'); words = choices(words_of(entry%choices))
     case ('logical'); words = '.true. or .false.'
     case ('number')
-      associate (allowed => variable%allowed)
+      associate (allowed => entry%allowed)
         words = 'number'
         if (allowed%whole) words = 'whole number'
-        if (variable%most > 1) words = to_text(variable%most)//' '//words//'s'
+        if (entry%most > 1) words = to_text(entry%most)//' '//words//'s'
         if (allowed%fewest > 0) words = to_text(allowed%fewest)//' to '//words
-        if (with_unit .and. len(allowed%unit) > 0) words = words//' ['//allowed%unit//']'
+        if (with_unit .and. allowed%unit /= '') words = words//' ['//trim(allowed%unit)//']'
         if (allowed%bounded_below()) words = words//', '//allowed%words()
       end associate
     case default
-      words = variable%kind
-      if (variable%most > 1) words = '1 to '//to_text(variable%most)//' '//words//'s'
+      words = trim(entry%kind)
+      if (entry%most > 1) words = '1 to '//to_text(entry%most)//' '//words//'s'
     end select
   end function values
 

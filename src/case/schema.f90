@@ -7,7 +7,9 @@ module schema_m
   use kinds_m, only: name_length
   use errors_m, only: to_text
   use string_builder_m, only: string_builder_t
-  use description_m, only: group_description_t, variable_t
+  use entries_m, only: entry_t
+  use group_visitor_m, only: group_visitor_t
+  use case_input_m, only: group_names, is_repeated, list_entries
   implicit none
   private
   public :: schema_text
@@ -15,181 +17,134 @@ module schema_m
 contains
 
   !> The schema of all groups.
-  pure function schema_text(groups) result(text)
-    type(group_description_t), intent(in) :: groups(:)
+  function schema_text() result(text)
     character(:), allocatable :: text
-    type(string_builder_t) :: lines
-    character(:), allocatable :: needed
+    type(string_builder_t) :: lines, places, groups
+    type(group_visitor_t) :: v
+    character(:), allocatable :: name, needed, comma
     integer :: g
 
     needed = ''
+    do g = 1, size(group_names)
+      name = trim(group_names(g))
+      comma = trim(merge(', ', '  ', g < size(group_names)))
+      call list_entries(name, v)
+      call add_group(v, groups)
+      call groups%add_line('    }'//comma)
+      text = '{"$ref": "#/$defs/'//name//'"}'
+      if (is_repeated(g)) then
+        text = '{"anyOf": ['//text//', {"type": "array", "items": '//text//'}]}'
+      else if (any(v%entry(:v%n)%required)) then
+        needed = needed//' '//name
+      end if
+      call places%add_line('    "'//name//'": '//text//comma)
+    end do
     call lines%add_line('{')
     call lines%add_line('  "$schema": "https://json-schema.org/draft/2020-12/schema",')
     call lines%add_line('  "title": "Case file of mics",')
     call lines%add_line('  "description": "Written by make reference; do not edit.",')
     call lines%add_line('  "type": "object",')
     call lines%add_line('  "properties": {')
-    do g = 1, size(groups)
-      call lines%add_line('    '//place_of_group(groups(g))//comma(g, size(groups)))
-      if (any(groups(g)%variable(:groups(g)%n)%required) .and. .not. groups(g)%repeated) then
-        needed = needed//', '//quoted(trim(groups(g)%name))
-      end if
-    end do
+    call lines%add(places%text())
     call lines%add_line('  },')
-    call lines%add_line('  "required": ['//needed(3:)//'],')
+    call lines%add_line('  "required": '//strings(needed(2:), ' ')//',')
     call lines%add_line('  "additionalProperties": false,')
     call lines%add_line('  "$defs": {')
-    do g = 1, size(groups)
-      call add_group(groups(g), lines)
-      call lines%add_line('    }'//comma(g, size(groups)))
-    end do
+    call lines%add(groups%text())
     call lines%add_line('  }')
     call lines%add_line('}')
     text = lines%text()
   end function schema_text
 
-  !> Where a group stands in a case: once, or any number of times.
-  pure function place_of_group(group) result(text)
-    type(group_description_t), intent(in) :: group
-    character(:), allocatable :: text
-    character(:), allocatable :: reference
-
-    reference = '{"$ref": "#/$defs/'//trim(group%name)//'"}'
-    text = quoted(trim(group%name))//': '
-    if (group%repeated) then
-      text = text//'{"anyOf": ['//reference//', {"type": "array", "items": '//reference//'}]}'
-    else
-      text = text//reference
-    end if
-  end function place_of_group
-
   !> The definition of a group, but for its closing brace.
-  pure subroutine add_group(group, lines)
-    type(group_description_t), intent(in) :: group
+  subroutine add_group(v, lines)
+    type(group_visitor_t), intent(in) :: v
     type(string_builder_t), intent(inout) :: lines
-    character(:), allocatable :: needed
-    integer :: i
+    character(:), allocatable :: needed, ways
+    integer :: i, bar
 
     needed = ''
-    call lines%add_line('    '//quoted(trim(group%name))//': {')
+    call lines%add_line('    "'//v%group%name//'": {')
     call lines%add_line('      "type": "object",')
-    call lines%add_line('      "description": '//quoted(group%meaning)//',')
+    call lines%add_line('      "description": '//quoted(v%meaning)//',')
     call lines%add_line('      "properties": {')
-    do i = 1, group%n
-      associate (variable => group%variable(i))
-        call lines%add_line('        '//quoted(variable%name)//': {')
-        call lines%add_line('          "description": '//quoted(with_unit(variable))//',')
-        call lines%add_line('          '//values(variable)//extras(variable))
-        call lines%add_line('        }'//comma(i, group%n))
-        if (variable%required) needed = needed//', '//quoted(variable%name)
-      end associate
+    do i = 1, v%n
+      call lines%add_line('        "'//trim(v%entry(i)%name)//'": {')
+      call lines%add_line('          "description": '//quoted(v%entry(i)%with_unit())//',')
+      call lines%add_line('          '//values(v%entry(i))//extras(v%entry(i)))
+      call lines%add_line('        }'//trim(merge(', ', '  ', i < v%n)))
+      if (v%entry(i)%required) needed = needed//' '//trim(v%entry(i)%name)
     end do
     call lines%add_line('      },')
-    select case (group%name)
-    case ('body')
-      call lines%add_line('      "anyOf": ['//needs('shape position')//', ' &
-        //needs('shape motion')//'],')
-    case ('drop')
-      call lines%add_line('      "anyOf": ['//needs('shape position')//', ' &
-        //needs('shapes position')//', '//needs('file')//'],')
-    case default
-      if (len(needed) > 0) call lines%add_line('      "required": ['//needed(3:)//'],')
-    end select
+    if (v%ways /= '') then
+      ways = ''
+      needed = v%ways//'|'
+      do while (needed /= '')
+        bar = index(needed, '|')
+        ways = ways//', {"required": '//strings(needed(:bar - 1), ' ')//'}'
+        needed = needed(bar + 1:)
+      end do
+      call lines%add_line('      "anyOf": ['//ways(3:)//'],')
+    else if (needed /= '') then
+      call lines%add_line('      "required": '//strings(needed(2:), ' ')//',')
+    end if
     call lines%add_line('      "additionalProperties": false')
   end subroutine add_group
 
-  !> One of several ways to give what a group needs.
-  pure function needs(names) result(text)
-    character(*), intent(in) :: names   !! separated by blanks
-    character(:), allocatable :: text
-
-    text = '{"required": ['//words_json(names)//']}'
-  end function needs
-
-  !> Meaning and unit, for editors that show only the description.
-  pure function with_unit(variable) result(text)
-    type(variable_t), intent(in) :: variable
-    character(:), allocatable :: text
-
-    text = variable%meaning
-    if (variable%kind /= 'number') return
-    if (len(variable%allowed%unit) > 0) text = text//' ['//variable%allowed%unit//']'
-  end function with_unit
-
   !> What the values of a variable may be.
-  pure function values(variable) result(text)
-    type(variable_t), intent(in) :: variable
+  pure function values(entry) result(text)
+    type(entry_t), intent(in) :: entry
     character(:), allocatable :: text
-    character(:), allocatable :: fewest
+    character(:), allocatable :: one, fewest
 
-    select case (variable%kind)
+    select case (entry%kind)
     case ('logical'); text = '"type": "boolean"'
-    case ('name')
-      text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
-      if (variable%most > 1) text = '"anyOf": [{'//text//'}, {"type": "array", "items": {'//text &
-        //'}, "minItems": 1, "maxItems": '//to_text(variable%most)//'}]'
-    case ('choice'); text = '"enum": ['//words_json(variable%choices)//']'
+    case ('name'); text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
+    case ('choice'); text = '"enum": '//strings(entry%choices, ' ')
     case ('number')
-      text = number(variable)
-      if (variable%most == 1) return
-      fewest = to_text(variable%most)
-      if (variable%allowed%fewest > 0) fewest = to_text(variable%allowed%fewest)
-      text = '"type": "array", "items": {'//text//'}, "minItems": '//fewest//', "maxItems": ' &
-        //to_text(variable%most)
-      if (variable%allowed%fewest == 1) text = '"anyOf": [{'//number(variable)//'}, {'//text//'}]'
+      associate (allowed => entry%allowed)
+        text = '"type": "number"'
+        if (allowed%whole) text = '"type": "integer"'
+        one = ', "exclusiveMinimum": '
+        if (allowed%with_low) one = ', "minimum": '
+        if (allowed%bounded_below()) text = text//one//to_text(allowed%low)
+        if (allowed%bounded_above()) text = text//', "maximum": '//to_text(allowed%high)
+      end associate
     case default; text = '"type": "string"'
     end select
+    if (entry%most == 1) return
+    one = text
+    fewest = to_text(merge(entry%allowed%fewest, entry%most, entry%allowed%fewest > 0))
+    text = '"type": "array", "items": {'//one//'}, "minItems": '//fewest//', "maxItems": ' &
+      //to_text(entry%most)
+    if (entry%allowed%fewest == 1) text = '"anyOf": [{'//one//'}, {'//text//'}]'
   end function values
 
-  !> One number with its bounds.
-  pure function number(variable) result(text)
-    type(variable_t), intent(in) :: variable
-    character(:), allocatable :: text
-
-    associate (allowed => variable%allowed)
-      text = '"type": "number"'
-      if (allowed%whole) text = '"type": "integer"'
-      if (allowed%bounded_below() .and. allowed%with_low) then
-        text = text//', "minimum": '//to_text(allowed%low)
-      else if (allowed%bounded_below()) then
-        text = text//', "exclusiveMinimum": '//to_text(allowed%low)
-      end if
-      if (allowed%bounded_above()) text = text//', "maximum": '//to_text(allowed%high)
-    end associate
-  end function number
-
   !> Unit, default and example; a comma in front of each.
-  pure function extras(variable) result(text)
-    type(variable_t), intent(in) :: variable
+  pure function extras(entry) result(text)
+    type(entry_t), intent(in) :: entry
     character(:), allocatable :: text
     integer :: value
 
     text = ''
-    if (variable%kind == 'number') then
-      if (len(variable%allowed%unit) > 0) text = ', "unit": '//quoted(variable%allowed%unit)
+    if (entry%allowed%unit /= '') text = ', "unit": "'//trim(entry%allowed%unit)//'"'
+    if (len(entry%value()) > 0 .and. .not. entry%required) then
+      text = text//', "default": '//json(entry%value(), entry%most > 1)
     end if
-    if (len(variable%value) > 0 .and. .not. variable%required) then
-      text = text//', "default": '//json(variable%value, variable%most > 1)
-    end if
-    value = index(variable%example, ' = ', back=.true.) + 3
-    text = text//', "examples": ['//json(variable%example(value:), variable%most > 1)//']'
+    value = index(entry%example, ' = ', back=.true.) + 3
+    text = text//', "examples": ['//json(entry%example(value:), entry%most > 1)//']'
   end function extras
 
-  !> A value of a case file in JSON: text, a logical, a number or a list of numbers.
+  !> A value of a case file in JSON: text, a logical, a number or a list of numbers or names.
   pure function json(value, list) result(text)
     character(*), intent(in) :: value
     logical, intent(in) :: list
     character(:), allocatable :: text
-    integer :: part
 
     select case (value(1:1))
     case ('''')
-      part = index(value, ''', ''')
-      if (list .and. part > 0) then   ! two words
-        text = '['//quoted(value(2:part - 1))//', '//quoted(value(part + 4:len(value) - 1))//']'
-      else
-        text = quoted(value(2:len(value) - 1))
-      end if
+      text = quoted(value(2:len(value) - 1))
+      if (list .and. index(value, ''', ''') > 0) text = strings(value(2:len(value) - 1), ''', ''')
     case ('.')
       text = value(2:len(value) - 1)
     case default
@@ -198,22 +153,22 @@ contains
     end select
   end function json
 
-  !> Words with a blank between them, as strings with commas between them.
-  pure function words_json(words) result(text)
-    character(*), intent(in) :: words
+  !> A list of words in JSON.
+  pure function strings(words, separator) result(text)
+    character(*), intent(in) :: words, separator
     character(:), allocatable :: text
-    integer :: i
+    integer :: first, length
 
-    text = '"'
-    do i = 1, len(words)
-      if (words(i:i) == ' ') then
-        text = text//'", "'
-      else
-        text = text//words(i:i)
-      end if
+    text = '['
+    first = 1
+    do
+      length = index(words(first:), separator) - 1
+      if (length < 0) exit
+      text = text//'"'//words(first:first + length - 1)//'", '
+      first = first + length + len(separator)
     end do
-    text = text//'"'
-  end function words_json
+    text = text//'"'//words(first:)//'"]'
+  end function strings
 
   !> A string between double quotes. The texts of the groups hold nothing that must be escaped
   !! but double quotes and backslashes.
@@ -229,14 +184,5 @@ contains
     end do
     text = text//'"'
   end function quoted
-
-  !> A comma after all but the last.
-  pure function comma(i, n) result(text)
-    integer, intent(in) :: i, n
-    character(:), allocatable :: text
-
-    text = ','
-    if (i == n) text = ''
-  end function comma
 
 end module schema_m

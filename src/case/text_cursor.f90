@@ -1,6 +1,6 @@
 !> A place in the text of a case, and the steps a reader takes from it.
 module text_cursor_m
-  use value_text_m, only: byte_order_mark
+  use text_file_m, only: plain_lines
   implicit none
   private
   public :: cursor_t, start_of, next, at_end, skip_blanks, skip_line, past_blanks
@@ -14,7 +14,7 @@ module text_cursor_m
     integer :: line = 1
   end type cursor_t
 
-  character(*), parameter :: line_feed = achar(10), carriage_return = achar(13), tab = achar(9)
+  character(*), parameter :: line_feed = achar(10), tab = achar(9)
   character(*), parameter :: blanks = ' '//tab//line_feed
   character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
   character(*), parameter :: name_characters = letters//'0123456789_%'
@@ -22,49 +22,27 @@ module text_cursor_m
 
 contains
 
-  !> The start of a text.
+  !> The start of a text, with blanks that do not break as blanks, but in strings.
   pure function start_of(text) result(cursor)
     character(*), intent(in) :: text
     type(cursor_t) :: cursor
-
-    cursor%text = plain_lines(text)
-  end function start_of
-
-  !> Line ends of every system as one line feed; a byte-order mark dropped; blanks that do not break
-  !! as blanks, but in strings; the last line ended.
-  pure function plain_lines(text) result(plain)
-    character(*), intent(in) :: text
-    character(:), allocatable :: plain
     character(*), parameter :: no_break_space = char(194)//char(160)
     character(1) :: quote   ! that has begun a string on this line, or blank
-    integer :: i, n, first
+    integer :: i
 
-    first = 1
-    if (index(text, byte_order_mark) == 1) first = len(byte_order_mark) + 1
-    allocate (character(len(text) + 1) :: plain)
-    n = 0
+    cursor%text = plain_lines(text)
     quote = ' '
-    do i = first, len(text)
-      if (text(i:i) == line_feed .and. i > 1) then
-        if (text(i - 1:i - 1) == carriage_return) cycle
-      end if
-      if (quote == ' ' .and. i > 1) then
-        if (text(i - 1:i) == no_break_space) then
-          plain(n:n) = ' '   ! where its first byte stands
-          cycle
+    do i = 1, len(cursor%text) - 1
+      associate (c => cursor%text(i:i))
+        if (c == line_feed .or. c == quote) then
+          quote = ' '
+        else if (quote == ' ' .and. scan(c, '"''') == 1) then
+          quote = c
         end if
-      end if
-      n = n + 1
-      plain(n:n) = text(i:i)
-      if (text(i:i) == carriage_return) plain(n:n) = line_feed
-      if (plain(n:n) == line_feed .or. plain(n:n) == quote) then
-        quote = ' '
-      else if (quote == ' ' .and. scan(plain(n:n), '"''') == 1) then
-        quote = plain(n:n)
-      end if
+      end associate
+      if (quote == ' ' .and. cursor%text(i:i + 1) == no_break_space) cursor%text(i:i + 1) = '  '
     end do
-    plain = plain(:n)//line_feed
-  end function plain_lines
+  end function start_of
 
   !> The next character; only to be asked before the end.
   pure function next(cursor) result(c)
