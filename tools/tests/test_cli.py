@@ -128,12 +128,19 @@ def test_a_variable_is_taken_out() -> None:
     text = (
         "&drop a = 1, 2,\n  3  ! of a\n  b = 'c = 4 / !', c = 5  ! kept\n  d = 6 /\n&drop c = 7 /\n"
     )
-    assert settings.unset(text, "drop", "a") == text.replace("a = 1, 2,\n  3  ! of a\n  ", "")
-    assert settings.unset(text, "drop", "d") == text.replace("d = 6 ", "")
-    assert settings.unset(text, "drop", "c", 1) == text.replace("c = 7 ", "")
-    assert settings.unset(text, "drop", "e") == settings.unset(text, "drop", "a", 2) == text
-    assert settings.value(settings.unset(text, "drop", "c"), "drop", "c") is None
-    assert settings.value(settings.unset(text, "drop", "c"), "drop", "b") == "c = 4 / !"
+
+
+    def without(name: str, n: int = 0) -> str:
+        return settings.set_group(text, "drop", {name: None}, n)
+
+    assert without("a") == text.replace("a = 1, 2,\n  3  !", "!")
+    assert without("d") == text.replace("d = 6 ", "")
+    assert without("c", 1) == text.replace("c = 7 ", "")
+    assert without("e") == text
+    assert settings.value(without("c"), "drop", "c") is None
+    assert settings.value(without("c"), "drop", "b") == "c = 4 / !"
+    with pytest.raises(BadRun, match="&drop 3: no such group"):
+        without("a", 2)
     with pytest.raises(BadRun, match="must be one group"):
         settings.variables("&grid cells = 3\n&drop shape=cube &body /")
 

@@ -416,7 +416,7 @@ def listeners(said: Path) -> set[tuple[str, int]]:
         with suppress(OSError):  # it has ended
             words = (process / "cmdline").read_bytes() + (process / "environ").read_bytes()
             if str(said).encode() in words:
-                sockets |= {os.readlink(end) for end in (process / "fd").iterdir()}
+                sockets |= {str(end.readlink()) for end in (process / "fd").iterdir()}
     lines = [line.split() for name in ("tcp", "tcp6")
              for line in Path("/proc/net", name).read_text().splitlines()[1:]]  # fmt: skip
     found = [line[1].split(":") for line in lines
@@ -444,7 +444,7 @@ def test_runs_on_this_machine_listen_nowhere(tmp_path: Path, program: Path) -> N
 
 @pytest.mark.cost(10)
 def test_a_queue_lets_nobody_in(tmp_path: Path, program: Path, queue: Path) -> None:
-    """Scheduler and worker want a certificate whose key lies in private files; they show nothing."""
+    """Scheduler and worker want a certificate; its key lies in private files, no page is open."""
     with slow_runs(program, "--cluster", "slurm"):
         found = listeners(tmp_path)
         outside = {place for place in found if place[0] != "127.0.0.1"}

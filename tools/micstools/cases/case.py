@@ -240,8 +240,9 @@ class Case:
             if here is None:  # was taken out
                 said.append(before)
                 continue
-            del left[here]
-            said.append(before + _changed(part, group))
+            group = left.pop(here)
+            given = dict.fromkeys(settings.variables(part)) | group.given
+            said.append(before + settings.patched(part, given))
         said.append(self._tail)
         new = [settings.group_text(g._group, g.given) for g in left if g.given]
         return "".join(said).rstrip("\n") + "\n" + "".join(f"\n{text}\n" for text in new)
@@ -326,18 +327,6 @@ class Case:
 
 def _all(found: Group | Groups) -> Sequence[Group]:
     return found if isinstance(found, Groups) else [found]
-
-
-def _changed(part: str, group: Group | None) -> str:
-    """The text of a group with what was changed since it was read."""
-    assert group is not None
-    before = settings.variables(part)
-    if group.given == before:
-        return part
-    if set(before) - set(group.given):
-        return settings.group_text(group._group, group.given)
-    new = {k: v for k, v in group.given.items() if k not in before or before[k] != v}
-    return settings.set_group(part, group._group, new)
 
 
 def _table(heads: Iterable[object], rows: Iterable[Iterable[object]]) -> str:

@@ -1,20 +1,23 @@
 """Variables of a case set from outside, `group.variable=value`, on a copy of its text."""
 
 import re
-import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import f90nml
 
+from micstools.reading import namelist
 from micstools.reading.reader import BadRun
 
 _FORM = re.compile(r"([A-Za-z]\w*)\.([A-Za-z]\w*)\s*=(.*)", re.DOTALL)
 _LOGICALS = {".true.": True, "true": True, ".false.": False, "false": False}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _STRINGS = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"|![^\n]*|\xa0")
+_PIECES = re.compile(
+    r"![^\n]*|(?P<name>[A-Za-z]\w*)\s*=|(?P<word>(?:\d+\*)?(?:'[^'\n]*'|\"[^\"\n]*\")+|[^\s,'\"!/=]+)"
+)
 _TOKENS = re.compile(r"'[^']*'|\"[^\"]*\"|![^\n]*|&\s*\w+|/")
 
 
@@ -113,76 +116,123 @@ def set_group(
     text: str, name: str, variables: dict[str, Any], occurrence: int | None = None
 ) -> str:
     """Set variables of every group of a name, or of one, counted from 0; add it if there is none.
-
-    f90nml changes the first group of a name only, so each is handed to it alone.
-    """
+    One whose value is none is taken out, so that it has its default."""
     places = [(start, end) for group, start, end in groups(text) if group == name]
     if not places:
-        return text.rstrip("\n") + "\n\n" + str(f90nml.Namelist({name: variables})) + "\n"
-    chosen = places if occurrence is None else [places[occurrence]]
-    for start, end in reversed(chosen):
-        text = text[:start] + _patched(text[start:end], name, variables) + text[end:]
+        return text.rstrip("\n") + "\n\n" + group_text(name, variables) + "\n"
+    if occurrence is not None and not 0 <= occurrence < len(places):
+        raise BadRun(f"&{name} {occurrence + 1}: no such group in the case")
+    for start, end in reversed(places if occurrence is None else [places[occurrence]]):
+        text = text[:start] + patched(text[start:end], variables) + text[end:]
     return text
 
 
-def unset(text: str, name: str, variable: str, occurrence: int = 0) -> str:
-    """Take a variable out of one of the groups of a name, so that it has its default."""
-    places = [(start, end) for group, start, end in groups(text) if group == name]
-    if occurrence >= len(places):
-        return text
-    start, end = places[occurrence]
-    return text[:start] + _without(text[start:end], name, variable) + text[end:]
+@dataclass(frozen=True)
+class _Assignment:
+    """Where a variable and its values stand in the text of a group."""
+
+    name: str
+    start: int
+    end: int  # of `name =`
+    words: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def stop(self) -> int:
+        """The end of the last value."""
+        return self.words[-1][1] if self.words else self.end
 
 
-def _without(group: str, name: str, variable: str) -> str:
-    """A group without a variable; its remarks stay if the variable stands on lines of its own."""
-    wanted = _read(group)
-    if wanted[name].pop(variable, None) is None:
+def _assignments(group: str) -> list[_Assignment]:
+    found: list[_Assignment] = []
+    for piece in _PIECES.finditer(group, group.index("&") + 1):
+        if piece["name"]:
+            found.append(_Assignment(piece["name"].lower(), *piece.span()))
+        elif piece["word"] and found:
+            found[-1].words.append(piece.span())
+    return found
+
+
+def patched(group: str, variables: dict[str, Any]) -> str:
+    """A group with variables set, or taken out where their value is none; all else, every remark
+    among it, stays as it stands."""
+    before = _variables(group)
+    variables = {
+        name: value[0] if isinstance(value, list) and len(value) == 1 else value
+        for name, value in variables.items()
+    }
+    wanted = {**before, **variables}
+    for name, value in variables.items():
+        if before.get(name) != value:
+            group = _with(group, name.lower(), value)
+    if _variables(group) != {name: value for name, value in wanted.items() if value is not None}:
+        words = " ".join(group.split())
+        raise BadRun(f"{words[:60]}: {', '.join(variables)} cannot be changed, write the text")
+    return group
+
+
+def _with(group: str, name: str, value: Any) -> str:
+    """A group with one variable set, or taken out."""
+    values = value if isinstance(value, list) else [] if value is None else [value]
+    new = [_word(v) for v in values]
+    found = [a for a in _assignments(group) if a.name == name]
+    for old in reversed(found[:-1] if new else found):  # where it stands twice, the last one counts
+        group = group[: old.start] + _without(group, old)
+    if not new:
         return group
-    plain = _STRINGS.sub(lambda found: " " * len(found[0]), group)  # no `=` in texts and remarks
-    found = re.search(rf"(?<![\w%]){variable}\s*=", plain, re.IGNORECASE)
-    if found:
-        ends = re.search(r"[A-Za-z]\w*\s*(\([^)]*\)\s*)?=|/|!", plain[found.end() :])
-        stop = found.end() + (ends.start() if ends else 0)
-        text = group[: found.start()] + group[stop:].lstrip(" ,")
-        try:
-            if _read(text) == wanted:
-                return re.sub(r"\n[ \t]*\n", "\n", text)
-        except BadRun:
-            pass
-    return str(wanted).rstrip("\n")
+    if not found:
+        return _added(group, f"{name} = {', '.join(new)}")
+    old = next(a for a in _assignments(group) if a.name == name)
+    kept = min(len(new), len(old.words))
+    if not kept:
+        return group[: old.end] + f" {', '.join(new)}" + group[old.end :]
+    new[kept - 1 :] = [", ".join(new[kept - 1 :])] if len(new) > kept else new[kept - 1 :]
+    if kept < len(old.words):
+        end = old.words[kept - 1][1]
+        rest = "".join(f"  {remark}\n" for remark in _remarks(group[end : old.stop]))
+        group = group[:end] + rest + group[old.stop :]
+    for (start, end), word in reversed(list(zip(old.words, new, strict=False))):
+        if _value(group[start:end]) != _value(word):
+            group = group[:start] + word + group[end:]
+    return group
 
 
-def _patched(group: str, name: str, variables: dict[str, Any]) -> str:
-    """A group with variables set. f90nml keeps its remarks, but spoils a list with a repeated
-    value, `2*0.01`: then the group is written anew."""
-    with tempfile.TemporaryDirectory() as folder:
-        before, after = Path(folder, "before.nml"), Path(folder, "after.nml")
-        before.write_text(group + "\n")
-        try:
-            wanted = _read(group)
-            wanted[name].update(f90nml.Namelist({name: variables})[name])
-            f90nml.patch(str(before), {name: variables}, str(after))
-        except BadRun:
-            raise
-        except Exception as error:  # f90nml raises what Python has for a text it cannot follow
-            raise BadRun(f"&{name}: cannot be changed, write it anew ({error})") from error
-        text = after.read_text().rstrip("\n")
-    try:
-        if _read(text) == wanted:
-            return text
-    except BadRun:
-        pass
-    return str(wanted).rstrip("\n")
+def _without(group: str, old: _Assignment) -> str:
+    """What follows an assignment, after the remarks between its values."""
+    rest = group[old.stop :].lstrip(" \t,")
+    if group[: old.start].rpartition("\n")[2].strip() == "" and rest.startswith("\n"):
+        rest = rest[1:].lstrip(" \t")  # of a line that would be empty
+    return "".join(f"{remark}\n" for remark in _remarks(group[old.start : old.stop])) + rest
+
+
+def _remarks(text: str) -> list[str]:
+    return [piece[0] for piece in _PIECES.finditer(text) if piece[0][0] == "!"]
+
+
+def _added(group: str, words: str) -> str:
+    """A group with one more assignment, on a line of its own if the `/` has one."""
+    body, line, last = group[:-1].rpartition("\n")
+    if not line or last.strip():
+        return f"{group[:-1].rstrip(' ')} {words} /"
+    start = next((a.start for a in reversed(_assignments(group))), 0)
+    indent = group[:start].rpartition("\n")[2] if start else ""
+    return f"{body}\n{indent if indent and not indent.strip() else '  '}{words}\n{last}/"
+
+
+def _word(value: Any) -> str:
+    """A value as f90nml writes it."""
+    return group_text("a", {"b": value}).partition("=")[2].rpartition("/")[0].strip()
 
 
 def _read(group: str) -> f90nml.Namelist:
     """A group as f90nml understands it."""
     try:
-        return f90nml.Parser().reads(group + "\n")
-    except Exception as error:  # f90nml raises what Python has for a text it cannot follow
-        words = " ".join(group.split())
-        raise BadRun(f"{words[:60]}: cannot be understood ({type(error).__name__})") from error
+        return namelist.read(group + "\n")
+    except ValueError as error:
+        raise BadRun(f"{' '.join(group.split())[:60]}: cannot be understood ({error})") from error
+
+
+def _variables(group: str) -> dict[str, Any]:
+    return dict(next(iter(_read(group).values()), {}))
 
 
 def variables(group: str) -> dict[str, Any]:
@@ -204,4 +254,4 @@ def value(text: str, group: str, variable: str, occurrence: int = 0) -> Any:
     if occurrence >= len(places):
         return None
     start, end = places[occurrence]
-    return _read(text[start:end])[group].get(variable)
+    return _variables(text[start:end]).get(variable)

@@ -20,11 +20,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import f90nml
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from micstools.reading import namelist
 from micstools.reading.profiles import along_line
 from micstools.shapes.geometry import Array, IntArray, place
 from micstools.shapes.shape import Shape
@@ -224,7 +224,7 @@ class Run:
         """All parameters of the case after defaults: for each group its occurrences in order."""
         text = self.provenance.get("parameters") or self.provenance["namelist"]
         found: dict[str, list[dict[str, Any]]] = {}
-        for name, group in f90nml.Parser().reads(str(text)).items():
+        for name, group in namelist.read(str(text)).items():
             found.setdefault(str(name).lower(), []).append(dict(group))
         return found
 

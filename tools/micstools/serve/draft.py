@@ -133,10 +133,8 @@ class Draft:
         group, name, n = str(order["group"]), str(order["variable"]), int(order["n"])
         about, words = self.variable(group, name), str(order["value"]).strip()
         there = sum(g == group for g, _, _ in settings.groups(self.text))
-        if not words:
-            self.text = settings.unset(self.text, group, name, n) if n < there else self.text
-        else:
-            value = typed(about, words, f"{group}.{name}")
+        value = typed(about, words, f"{group}.{name}") if words else None
+        if words or there:
             self.text = settings.set_group(self.text, group, {name: value}, n if there else None)
 
     def _add(self, order: dict[str, Any]) -> None:
