@@ -75,7 +75,7 @@ help:
 	@echo '               RUNS=50; MOVES=20: besides, what moves the shares, 20 coarse runs of each'
 	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
 	@echo 'make docs     pages to browse, build/docs/site/index.html; every link is followed'
-	@echo 'make lint     style of the Fortran and Python sources'
+	@echo 'make lint     style of the Fortran and Python sources, sizes against tools/budgets.toml'
 	@echo 'make clean    remove what make has built'
 	@echo 'Variables: OPT="-O2" for a portable binary, LTO= for a quick build, FC_SERIAL, FC_MPI, CASE'
 
