@@ -41,7 +41,7 @@ def test_units_and_meanings_come_from_the_schema(case: Case) -> None:
     assert "[s]" in case.run.about("t_end") and "default 0.01" in case.run.about("dt")
     assert "'coupled'" in type(case.run).physics.__doc__
     assert "t_end: the simulated time [s]" in type(case.run).__doc__
-    known = {name: set(cases._variables(name)) for name in cases.schema()["properties"]}
+    known = {name: set(cases.variables(name)) for name in cases.schema()["properties"]}
     assert all(known.values()) and {"position", "spread"} <= known["drop"]
 
 

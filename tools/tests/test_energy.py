@@ -40,7 +40,7 @@ def thrown(push: float = 0.0, twist: float = 0.0, **values: Any) -> Any:
         bodies=bodies,
         series=SimpleNamespace(time=time, contact_energy=np.zeros(8), dt=np.full(8, STEP)),
         sides={"x_min": "no_slip", "z_max": "open"},
-        value=lambda group, name, default: values.get(name, default),
+        value=lambda group, name: values.get(name, 0.0),
     )
 
 

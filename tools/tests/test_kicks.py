@@ -44,7 +44,7 @@ def falling(step: float = 1e-3, kick: float = 0.0, **other: Any) -> Any:
         "contacts": np.zeros((time.size, 2), int),
     }
     return SimpleNamespace(
-        value=lambda group, name, default: values.get((group, name), default),
+        value=lambda *name: values.get(name),
         physics=values.get(("run", "physics"), "coupled"),
         gravity=np.array([0.0, 0.0, -G]),
         bodies=SimpleNamespace(**(bodies | other)),

@@ -27,8 +27,11 @@ def test_shapes_grid_and_parameters(loose_pile: Run) -> None:
     assert loose_pile.grid.spacing == pytest.approx([0.005] * 3)
     assert loose_pile.grid.high == pytest.approx([0.3, 0.1, 0.2])
     assert len(loose_pile.parameters["body"]) == 3
-    assert loose_pile.value("fluid", "water_level", None) == 0.15
-    assert loose_pile.value("fluid", "no_such_name", 7.0) == 7.0
+    assert loose_pile.value("fluid", "water_level") == 0.15
+    assert loose_pile.value("fluid", "gravity") == [0, 0, -9.81], "not in the file: today's default"
+    assert loose_pile.value("water", "min") is None
+    with pytest.raises(KeyError):
+        loose_pile.value("fluid", "no_such_name")
     assert loose_pile.sides["z_max"] == "open"
     assert loose_pile.sides["x_min"] == "no_slip"
 

@@ -34,7 +34,7 @@ def run_of(z: np.ndarray, step: float, length: float, g: float = G) -> Any:
         bodies=bodies,
         shapes={"block": shape},
         gravity=np.array([0.0, 0, -g]),
-        value=lambda group, name, default: default,
+        value=lambda group, name: 0.5,
     )
 
 

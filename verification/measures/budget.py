@@ -17,9 +17,9 @@ class Budget:
         """Add up the cells."""
         b, h = run.bodies, run.grid.spacing
         self.time, self.bodies = run.field_times, b
-        self.g = np.array(run.value("fluid", "gravity", [0.0, 0.0, -9.81]), float)
-        liquid = float(run.value("fluid", "liquid_density", 998.2))
-        gas = float(run.value("fluid", "gas_density", 1.204))
+        self.g = np.array(run.value("fluid", "gravity"), float)
+        liquid = float(run.value("fluid", "liquid_density"))
+        gas = float(run.value("fluid", "gas_density"))
         fluid, walls, weight, height = [], [], [], []
         for t in self.time:
             field = run.fields_at(t)

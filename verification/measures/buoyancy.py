@@ -25,10 +25,10 @@ def buoyancy_rows(run: Run, checks: Checks) -> None:
     The bands are shares of the displaced weight, and of that weight times the size of the block
     for the torque.
     """
-    level = float(run.value("fluid", "water_level", 0.0))
+    level = float(run.value("fluid", "water_level"))
     densities = (
-        float(run.value("fluid", "liquid_density", 998.2)),
-        float(run.value("fluid", "gas_density", 1.204)),
+        float(run.value("fluid", "liquid_density")),
+        float(run.value("fluid", "gas_density")),
     )
     for k, body in present_bodies(run, len(run.bodies.time) - 1).items():
         heights = body.points[:, 2]

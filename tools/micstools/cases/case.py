@@ -15,37 +15,22 @@ prints: `help(case.run)`, `case.drop[0].about("spread")`.
 import argparse
 import difflib
 import html
-import json
 import subprocess
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from micstools.cases import case_copy, program, settings
 from micstools.reading.reader import BadRun, Run
+from micstools.reading.schema import schema, variables
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _OUTPUT = "mics-out"
-
-
-@cache
-def schema() -> dict[str, Any]:
-    """Of the case file, as `mics --help=json` prints it."""
-    found: dict[str, Any] = json.loads(
-        (files("micstools") / "mics-case.schema.json").read_text("utf-8")
-    )
-    return found
-
-
-def _variables(group: str) -> dict[str, dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = schema()["$defs"][group]["properties"]
-    return found
 
 
 def _repeated(group: str) -> bool:
@@ -62,7 +47,7 @@ class _Variable:
     """A variable of a group as an attribute."""
 
     def __init__(self, group: str, name: str) -> None:
-        about = _variables(group)[name]
+        about = variables(group)[name]
         self.name, self.default = name, about.get("default")
         self.__doc__ = _describe(about)
 
@@ -102,12 +87,12 @@ class Group:
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name != "given" and not isinstance(getattr(type(self), name, None), _Variable):
-            known = _variables(self._group)
+            known = variables(self._group)
             raise AttributeError(f"&{self._group} has no variable {name}{_near(name, known)}")
         super().__setattr__(name, value)
 
     def __getattr__(self, name: str) -> Any:
-        known = _variables(self._group)
+        known = variables(self._group)
         raise AttributeError(f"&{self._group} has no variable {name}{_near(name, known)}")
 
     @classmethod
@@ -124,7 +109,7 @@ class Group:
         rows = [
             (f"<b>{name}</b>" if name in self.given else name, repr(self.given.get(name, "")),
              repr(about.get("default", "")), about["description"])
-            for name, about in _variables(self._group).items()
+            for name, about in variables(self._group).items()
         ]  # fmt: skip
         return _table(("variable", "given", "default", "meaning"), rows)
 
@@ -154,10 +139,10 @@ class _RunGroup(Group):
 def group_class(name: str) -> type[Group]:
     """The class of the groups of a name, with a property and a docstring for each variable."""
     base = _RunGroup if name == "run" else Group
-    variables = {key: _Variable(name, key) for key in _variables(name)}
-    lines = [f"    {key}: {variable.__doc__}" for key, variable in variables.items()]
+    known = {key: _Variable(name, key) for key in variables(name)}
+    lines = [f"    {key}: {variable.__doc__}" for key, variable in known.items()]
     doc = f"&{name}: {schema()['$defs'][name]['description']}.\n\n" + "\n".join(lines)
-    return type(name, (base,), {"_group": name, "__doc__": doc, **variables})
+    return type(name, (base,), {"_group": name, "__doc__": doc, **known})
 
 
 class Groups(list[Group]):

@@ -149,10 +149,10 @@ def assumptions(ensemble: Ensemble) -> str:
     said = ["This rests on what was assumed: " + _friction(run, varied)]
     said += run_words.drops(run, ensemble.units, seeds=False)
     cells = " x ".join(str(len(f) - 1) for f in run.grid.faces)
-    model = str(run.value("contact", "model", "surface")).strip()
+    model = run.value("contact", "model")
     said.append(f"contact '{model}'")
     if run.physics == "coupled":
-        coupling = str(run.value("numerics", "coupling", "monolithic")).strip()
+        coupling = run.value("numerics", "coupling")
         said[-1] += f", {cells} cells, coupling '{coupling}'"
     if varied:
         said.append("varied: " + "; ".join(_varied(ensemble, name) for name in varied))
@@ -164,15 +164,12 @@ def assumptions(ensemble: Ensemble) -> str:
 
 def _friction(run: Run, varied: list[str]) -> str:
     """Friction and restitution, where they were the same in all runs."""
-    known = [
-        ("friction", "friction of blocks", 0.6),
-        ("wall_friction", "friction of walls and floor", 0.4),
-    ]
-    if str(run.value("contact", "law", "restitution")).strip() == "restitution":
-        known.append(("restitution", "restitution", 0.3))
+    known = [("friction", "friction of blocks"), ("wall_friction", "friction of walls and floor")]
+    if run.value("contact", "law") == "restitution":
+        known.append(("restitution", "restitution"))
     return ", ".join(
-        f"{words} {run.value('contact', name, usual):.3g}"
-        for name, words, usual in known
+        f"{words} {run.value('contact', name):.3g}"
+        for name, words in known
         if f"contact.{name}" not in varied
     )
 

@@ -31,7 +31,7 @@ _ROWS = 300  # of the table of blocks to come
 def page(found: SetUp, name: str, north: float | None = None) -> str:
     """The page of a set-up as text. `name`: of the case where it has no title; `north`: its
     direction in the plan, degrees from +y towards +x."""
-    title = str(found.run.value("run", "title", "") or "").strip() or name
+    title = found.run.value("run", "title") or name
     return document(
         title,
         tag("h1", title),
@@ -206,7 +206,7 @@ def _placed(run: Run) -> int:
 
 
 def _wet(run: Run) -> bool:
-    return str(run.value("run", "physics", "coupled")).strip() in ("coupled", "fluid")
+    return run.physics in ("coupled", "fluid")
 
 
 def _cells(run: Run) -> list[list[float]]:
@@ -221,12 +221,12 @@ def _cells(run: Run) -> list[list[float]]:
 
 def _water(run: Run) -> dict[str, Any] | None:
     """The level of the water at the start."""
-    if str(run.value("run", "physics", "coupled")).strip() == "dry":
+    if run.physics == "dry":
         return None
     low, high = float(run.grid.low[2]), float(run.grid.high[2])
-    if bool(run.value("fluid", "single_phase", False)):
+    if run.value("fluid", "single_phase"):
         return {"level": high - low}
-    level = run.value("fluid", "water_level", None)
+    level = run.value("fluid", "water_level")
     if level is None or not low < float(level):
         return None
     return {"level": min(float(level), high) - low}
@@ -298,7 +298,8 @@ def _places(run: Run, remark: Remark) -> list[list[float]]:
         d = "xyz".index(remark.variable[0])
         middle[d] = low[d] if "min" in remark.variable else high[d]
     elif (remark.group, remark.variable) == ("fluid", "water_level"):
-        middle[2] = np.clip(float(run.value("fluid", "water_level", middle[2])), low[2], high[2])
+        level = run.value("fluid", "water_level")
+        middle[2] = middle[2] if level is None else np.clip(float(level), low[2], high[2])
     elif remark.group != "grid":
         return []
     return [(middle - low).tolist()]

@@ -1,14 +1,13 @@
 """The case and the end of a run in words."""
 
-import json
 import re
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from micstools.reading.reader import Run
+from micstools.reading.schema import schema, variables
 from micstools.reading.units import Units, figure
 from micstools.shapes.geometry import Array
 
@@ -33,8 +32,7 @@ LIGHT = (
 
 def title(run: Run, folder: Path | None = None) -> str:
     """The title of the case, else the name of a folder, by default its own; and its note."""
-    said = str(run.value("run", "title", "") or "").strip()
-    said = said or (folder or run.folder).resolve().name
+    said = run.value("run", "title") or (folder or run.folder).resolve().name
     return said + (f" ({run.note})" if run.note else "")
 
 
@@ -208,10 +206,10 @@ def tank(run: Run, units: Units) -> str:
     """The tank, its water and its cells."""
     size, spacing = run.grid.high - run.grid.low, run.grid.spacing
     said = "The tank measures " + units.length.row(size, " x ", 4)
-    level = run.value("fluid", "water_level", None)
+    level = run.value("fluid", "water_level")
     if run.physics == "dry":
         said += " and is dry"
-    elif bool(run.value("fluid", "single_phase", False)):
+    elif run.value("fluid", "single_phase"):
         said += " and is full of liquid"
     elif level is not None:
         depth = float(level) - float(run.grid.low[2])
@@ -224,12 +222,12 @@ def tank(run: Run, units: Units) -> str:
 def contact(run: Run) -> str:
     """How blocks touch: what a reader must know who doubts the pile."""
     model = {"surface": "exact surfaces", "spheres": "the spheres of the paper"}
-    kind = str(run.value("contact", "model", "surface")).strip()
+    kind = run.value("contact", "model")
     said = f"Blocks touch by {model.get(kind, kind)} with a friction of "
-    said += f"{run.value('contact', 'friction', 0.6):.3g} on each other and "
-    said += f"{run.value('contact', 'wall_friction', 0.4):.3g} on walls and floor"
-    if str(run.value("contact", "law", "restitution")).strip() == "restitution":
-        said += f", and spring back with {run.value('contact', 'restitution', 0.3):.3g} of "
+    said += f"{run.value('contact', 'friction'):.3g} on each other and "
+    said += f"{run.value('contact', 'wall_friction'):.3g} on walls and floor"
+    if run.value("contact", "law") == "restitution":
+        said += f", and spring back with {run.value('contact', 'restitution'):.3g} of "
         said += "their speed"
     return said + "."
 
@@ -249,23 +247,14 @@ def differing(run: Run) -> list[tuple[str, str, str]]:
     """Variables of the case that are not at their defaults: name, value, default. What has no
     default, and where blocks and drops are, is the case itself and stands elsewhere."""
     found = []
-    for group, known in _defaults().items():
+    for group in schema()["$defs"]:
         if group in ("body", "drop", "shape", "water", "grid"):
             continue
         for name, value in (run.parameters.get(group) or [{}])[0].items():
-            usual = known.get(name)
+            usual = variables(group).get(name, {}).get("default")
             if usual is not None and name not in ("title", "output") and not _same(value, usual):
                 found.append((f"{group}.{name}", shown(value), shown(usual)))
     return found
-
-
-def _defaults() -> dict[str, dict[str, Any]]:
-    """Default of each variable of each group, from the schema that is made of the program."""
-    kinds = json.loads((files("micstools") / "mics-case.schema.json").read_text())["$defs"]
-    return {
-        group: {name: entry.get("default") for name, entry in kind.get("properties", {}).items()}
-        for group, kind in kinds.items()
-    }
 
 
 def _same(value: Any, usual: Any) -> bool:

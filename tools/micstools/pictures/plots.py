@@ -50,7 +50,7 @@ def history(run: Run) -> Figure:
     for axis in axes[max(0, len(panels) - 2) : len(panels)]:
         axis.set_xlabel("time [s]")
         axis.tick_params(labelbottom=True)
-    title = str(run.value("run", "title", "") or run.folder.name).strip()
+    title = run.value("run", "title") or run.folder.name
     figure.suptitle(f"{title} ({run.note})" if run.note else title)
     _name_blocks(figure, list(axes), run)
     return figure

@@ -87,7 +87,7 @@ def level_follows(run: Run) -> bool:
     """Does the level follow from the blocks alone: still water, in a box, that cannot leave?"""
     ways_out = {"inflow", "outflow", "open"} & {k for s, k in run.sides.items() if s != "z_max"}
     wet = run.physics in ("coupled", "light")
-    known = run.value("fluid", "water_level", None) is not None and not run.parameters.get("water")
+    known = run.value("fluid", "water_level") is not None and not run.parameters.get("water")
     return bool(wet and known and not ways_out and not len(run.bed[1]))
 
 
@@ -234,7 +234,8 @@ def demanded_level(run: Run, row: int) -> float:
     """Height [m] at which the liquid of the start stands around the bodies of a row."""
     size = run.grid.high - run.grid.low
     area, floor = float(size[0] * size[1]), float(run.grid.low[2])
-    start = float(run.value("fluid", "water_level", floor))
+    start = run.value("fluid", "water_level")
+    start = floor if start is None else float(start)
     placed_by_case = len(run.parameters.get("body", []))  # the dropped ones raise the level
     at_start = {k: body for k, body in present_bodies(run, 0).items() if k < placed_by_case}
     inside = sum(below_plane(body.tets, start)[0] for body in at_start.values())
@@ -251,8 +252,8 @@ def still_level(run: Run) -> float | None:
     """Level [m] of the water when it has come to rest around the blocks of the last row; that of
     the start where it does not follow from the blocks."""
     wet = run.physics != "dry"
-    level = run.value("fluid", "water_level", None)
-    if not wet or level is None or bool(run.value("fluid", "single_phase", False)):
+    level = run.value("fluid", "water_level")
+    if not wet or level is None or bool(run.value("fluid", "single_phase")):
         return None
     if not level_follows(run):
         return float(level)
@@ -278,7 +279,7 @@ def water_level(run: Run) -> Level:
     """Level at the last written field."""
     t = float(run.field_times[-1])
     demanded = demanded_level(run, run.bodies.row(t))
-    start = float(run.value("fluid", "water_level", 0.0))
+    start = float(run.value("fluid", "water_level"))
     return Level(start, measured_level(run, t, demanded), demanded)
 
 

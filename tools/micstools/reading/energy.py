@@ -114,7 +114,7 @@ def _single_steps(run: Run) -> NDArray[np.bool_]:
 def _walls_move(run: Run) -> bool:
     """Does a side of the tank that blocks can touch move along itself?"""
     return any(
-        np.any(run.value("boundary", f"{side}_velocity", 0.0))
+        np.any(run.value("boundary", f"{side}_velocity"))
         for side, kind in run.sides.items()
         if kind in WALL_KINDS
     )

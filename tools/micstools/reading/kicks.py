@@ -103,7 +103,7 @@ def _of_block(run: Run, k: int, length: float, clear: float) -> tuple[Array, Arr
     whether its rows are near enough to each other (T)."""
     b, span = run.bodies, window(run, length)
     time, row = b.time, np.arange(b.time.size)
-    level = float(run.value("fluid", "water_level", 0.0))
+    level = float(run.value("fluid", "water_level"))
     past = np.searchsorted(time, time - clear * span * (1 + _SAME))  # rows of the time to look at
     end = np.searchsorted(time, time + span * (1 - _SAME))  # the first at or after the end
     late = np.searchsorted(time, time + (1 + clear) * span * (1 - _SAME))
@@ -127,7 +127,7 @@ def _none(flags: NDArray[np.bool_], first: IntArray, last: IntArray) -> Array:
 def _rows_apart(run: Run, length: float) -> float:
     """Largest distance of rows that are not those of every step [s]: they must see the window, and
     every impact."""
-    return min(window(run, length) / 2, float(run.value("contact", "contact_time", 2e-3)))
+    return min(window(run, length) / 2, float(run.value("contact", "contact_time")))
 
 
 def _steps(run: Run) -> Array:
@@ -142,6 +142,6 @@ def _has_level(run: Run) -> bool:
     """Are there blocks, a fluid with a level, and weight?"""
     if not run.bodies.n:
         return False
-    level = run.value("fluid", "water_level", None) is not None
-    single = bool(run.value("fluid", "single_phase", False))
+    level = run.value("fluid", "water_level") is not None
+    single = bool(run.value("fluid", "single_phase"))
     return run.physics == "coupled" and level and not single and bool(run.gravity.any())

@@ -292,7 +292,7 @@ def _stick_out(body: Placed) -> float:
 
 def by_spheres(run: Run, body: Placed) -> bool:
     """Does a block collide by spheres: by contact spheres, or as the ball that it is?"""
-    if str(run.value("contact", "model", "surface")).strip() == "spheres":
+    if run.value("contact", "model") == "spheres":
         return True
     kinds = {s.get("name"): s.get("kind") for s in run.parameters.get("shape", [])}
     return str(kinds.get(body.shape.name)).strip() == "sphere"

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from micstools.reading import namelist
 from micstools.reading.profiles import along_line
+from micstools.reading.schema import variables
 from micstools.shapes.geometry import Array, IntArray, place
 from micstools.shapes.shape import Shape
 
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 NOT_RESOLVED = "light: not resolved"
-_DEFAULT_SIDES = {"z_max": "open"}
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 
@@ -181,7 +181,7 @@ class Run:
     def __str__(self) -> str:
         """What there is, a line each; numbers of blocks count from 1."""
         b, times = self.bodies, self.field_times
-        title = str(self.value("run", "title", "")).strip()
+        title = self.value("run", "title")
         cells = " x ".join(str(len(f) - 1) for f in self.grid.faces)
         size = " x ".join(f"{edge:g}" for edge in self.grid.high - self.grid.low)
         fixed = ", ".join(str(k + 1) for k in np.flatnonzero(b.fixed)) or "none"
@@ -228,15 +228,17 @@ class Run:
             found.setdefault(str(name).lower(), []).append(dict(group))
         return found
 
-    def value(self, group: str, name: str, default: T) -> T:
-        """A parameter of the case, or `default` where the case does not give it."""
+    def value(self, group: str, name: str) -> Any:
+        """A parameter of the case as the run took it. What the results of an older program lack has
+        today's default; None where there is none."""
         found = self.parameters.get(group, [{}])[0].get(name)
-        return default if found is None else found
+        found = variables(group)[name].get("default") if found is None else found
+        return found.strip() if isinstance(found, str) else found
 
     @property
     def physics(self) -> str:
         """What was computed: 'coupled', 'fluid', 'dry' or 'light'."""
-        return str(self.value("run", "physics", "coupled")).strip()
+        return str(self.value("run", "physics"))
 
     @property
     def note(self) -> str:
@@ -246,13 +248,12 @@ class Run:
     @cached_property
     def gravity(self) -> Array:
         """Acceleration of gravity (3) [m/s2]."""
-        return np.array(self.value("fluid", "gravity", [0.0, 0.0, -9.81]), float)
+        return np.array(self.value("fluid", "gravity"), float)
 
     @cached_property
     def sides(self) -> dict[str, str]:
         """Kind of boundary on each of the six sides."""
-        kinds = {s: self.value("boundary", s, _DEFAULT_SIDES.get(s, "no_slip")) for s in _SIDES}
-        return {side: kind.strip() for side, kind in kinds.items()}
+        return {side: self.value("boundary", side) for side in _SIDES}
 
     @cached_property
     def periodic(self) -> tuple[bool, ...]:

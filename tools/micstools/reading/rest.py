@@ -36,7 +36,7 @@ def of_block(run: Run, k: int) -> Rest:
     limit, span = WAY * length, _STAY * fall_time(run, length)
     start = int(np.searchsorted(b.time, b.release_time[k] - 1e-12))
     if not np.isfinite(span):  # no weight: what the case calls rest
-        span = float(run.value("run", "rest_time", 0.5))
+        span = float(run.value("run", "rest_time"))
     if start >= b.time.size:
         return Rest(k + 1, float("nan"), float("nan"), span, limit)
     time, away = b.time[start:], _away(run, k, start)

@@ -67,7 +67,7 @@ def state(run: Run) -> State:
     """How far a run is, and whether its program lives."""
     time, wall = run.series.time, run.series.wall_time
     code = int(run.provenance.get("exit_status", _RUNNING))
-    end = float(run.value("run", "t_end", float("nan")))
+    end = float(run.value("run", "t_end"))
     now, passed = (float(time[-1]), float(wall[-1])) if time.size else (0.0, 0.0)
     if code != _RUNNING:
         words = _WORDS.get(code, f"ended with code {code}")

@@ -169,7 +169,7 @@ def _facts(run: Run, found: State) -> Markup:
     ]
     if b.n and b.time.size:
         here = b.present(-1)
-        moving = (_speeds(run) > float(run.value("run", "rest_speed", 1e-3))) & here & ~b.fixed
+        moving = (_speeds(run) > float(run.value("run", "rest_speed"))) & here & ~b.fixed
         said = run_words.count(int(moving.sum()), "block moves", "blocks move")
         pairs.append(("released", f"{int(here.sum())} of {b.n}", said))
     return facts(pairs)

@@ -11,7 +11,7 @@ TOUCHING = 0.803  # of the displaced mass: a sphere, Lamb, Hydrodynamics, art. 9
 def added_mass(run: Run) -> float:
     """From the acceleration of the run's last row: a = g (1 - s)/(s + Ca)."""
     b = run.bodies
-    ratio = run.shapes[b.shape[0]].density / float(run.value("fluid", "liquid_density", 998.2))
+    ratio = run.shapes[b.shape[0]].density / float(run.value("fluid", "liquid_density"))
     return 9.81 * (1 - ratio) / float(b.velocity[-1, 0, 2] / b.time[-1]) - ratio
 
 

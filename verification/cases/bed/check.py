@@ -33,7 +33,7 @@ def volume(run: Run) -> float:
 def slope(run: Run, checks: Checks) -> None:
     """Creep below the friction angle, acceleration above it."""
     b, name = run.bodies, run.folder.name
-    mu = float(run.value("contact", "wall_friction", 0.4))
+    mu = float(run.value("contact", "wall_friction"))
     if mu > np.tan(THETA):
         i, j = b.row(1.0), b.row(2.0)
         way = float(np.linalg.norm(b.position[j, 0] - b.position[i, 0]))
@@ -92,7 +92,7 @@ def still(run: Run, checks: Checks) -> None:
     checks.below(f"{name}: largest speed at any time [m/s]", written, SPEED)
     final = float(np.abs(run.restart()["flow/u"]).max())
     checks.below(f"{name}: largest speed at the end [m/s]", final, SPEED)
-    level = float(run.value("fluid", "water_level", 0.0))
+    level = float(run.value("fluid", "water_level"))
     extent = run.grid.high - run.grid.low
     wanted = extent[0] * extent[1] * level - volume(run)
     checks.close(f"{name}: liquid [m3]", float(run.series.liquid_volume[0]), wanted, 1e-12)

@@ -43,7 +43,7 @@ def rows(name: str) -> np.ndarray:
 
 def restitution(run: Run, checks: Checks) -> None:
     """Ratio of the speeds before and after: on the floor, and of two blocks."""
-    b, e = run.bodies, float(run.value("contact", "restitution", 0.3))
+    b, e = run.bodies, float(run.value("contact", "restitution"))
     low, high = e - RESTITUTION_BAND, e + RESTITUTION_BAND
     if e == 1.0:  # energy 0.99 to 1.01
         low, high = np.sqrt(0.99), np.sqrt(1.01)
@@ -92,8 +92,8 @@ def duration(zeta: np.ndarray) -> np.ndarray:
 def ball(run: Run, checks: Checks) -> None:
     """Times of two impacts and the height between, against the same spring and dashpot, and against
     a rigid ball as far as the contact is short."""
-    b, e = run.bodies, float(run.value("contact", "restitution", 0.3))
-    contact_time = float(run.value("contact", "contact_time", 2e-3))
+    b, e = run.bodies, float(run.value("contact", "restitution"))
+    contact_time = float(run.value("contact", "contact_time"))
     t, gap, g = b.time, b.position[:, 0, 2] - 0.02, 9.81
     _, _, first, top, second, _ = next(r for r in rows("D7.csv") if np.allclose(r[:2], (gap[0], e)))
     name = f"ball, h = {gap[0]:g}, e = {e:g}, contact {1e3 * contact_time:g} ms:"
@@ -118,8 +118,8 @@ def ball(run: Run, checks: Checks) -> None:
 
 def power_law(run: Run, checks: Checks) -> None:
     """Duration, restitution and, without a dashpot, depth of the impact on a power-law spring."""
-    b, gamma = run.bodies, float(run.value("contact", "gamma_n", 1.0))
-    damping = float(run.value("contact", "eta_n", 0.0)) * TIME / b.mass[0]
+    b, gamma = run.bodies, float(run.value("contact", "gamma_n"))
+    damping = float(run.value("contact", "eta_n")) * TIME / b.mass[0]
     for k in range(b.n):
         v = -b.velocity[0, k, 2] * TIME / LENGTH
         begun = 1e-3

@@ -19,9 +19,9 @@ def check(runs: list[Run]) -> Checks:
     checks, errors, ours, exact = Checks("capillary wave"), {}, {}, {}
     for run in runs:
         name, cells = run.folder.name, round(1.0 / run.grid.spacing[0])
-        rho = tuple(float(run.value("fluid", f"{of}_density", 0.0)) for of in ("liquid", "gas"))
-        mu = float(run.value("fluid", "liquid_viscosity", 0.0))
-        sigma = float(run.value("fluid", "surface_tension", 0.0))
+        rho = tuple(float(run.value("fluid", f"{of}_density")) for of in ("liquid", "gas"))
+        mu = float(run.value("fluid", "liquid_viscosity"))
+        sigma = float(run.value("fluid", "surface_tension"))
         omega = (sigma * WAVENUMBER**3 / sum(rho)) ** 0.5
         time, amplitude = standing_amplitude(run)
         reference = prosperetti_two_fluids(time, WAVENUMBER, omega, mu / rho[0], (rho[0], rho[1]))

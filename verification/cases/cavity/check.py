@@ -57,7 +57,7 @@ def check(runs: list[Run]) -> Checks:
         errors: dict[float, float] = {}
         finest = None
         for run in runs:
-            if round(1.0 / float(run.value("fluid", "liquid_viscosity", 1.0))) != reynolds:
+            if round(1.0 / float(run.value("fluid", "liquid_viscosity"))) != reynolds:
                 continue
             cells = run.grid.x.size - 1
             finest = run if not errors or cells > max(errors) else finest

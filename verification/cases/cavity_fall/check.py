@@ -30,13 +30,13 @@ class Fall:
     def __init__(self, run: Run) -> None:
         """`windows` (T) [g] from each row on, `change` [m/s] the largest of them."""
         b, g = run.bodies, 9.81
-        level = float(run.value("fluid", "water_level", 0.0))
+        level = float(run.value("fluid", "water_level"))
         self.length = level / 5.025
-        self.kind = str(run.value("shape", "kind", "")).strip()
+        self.kind = run.value("shape", "kind")
         self.cells = round(self.length / float(run.grid.spacing[2]))
-        self.courant = float(run.value("run", "cfl_max", 0.0))
-        self.seed = int(run.value("drop", "seed", 0))
-        tension = float(run.value("fluid", "surface_tension", 0.0)) > 0
+        self.courant = float(run.value("run", "cfl_max"))
+        self.seed = int(run.value("drop", "seed"))
+        tension = float(run.value("fluid", "surface_tension")) > 0
         size = "2 m" if self.length > 1 else "50 mm"
         self.name = f"{self.kind} of {size}{', surface tension' if tension else ''}"
         self.name += f", {self.cells} cells"

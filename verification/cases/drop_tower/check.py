@@ -27,8 +27,8 @@ class Fall:
         is the weight under water over half the density and the front of an upright block [m2/s2].
         """
         b, block = run.bodies, run.shapes["block"]
-        level = float(run.value("fluid", "water_level", 0.0))
-        liquid = float(run.value("fluid", "liquid_density", 998.2))
+        level = float(run.value("fluid", "water_level"))
+        liquid = float(run.value("fluid", "liquid_density"))
         z, self.speed = b.position[:, 0, 2], -b.velocity[:, 0, 2]
         self.time, self.way, self.depth = b.time, z[0] - z, level - z
         low = np.array([run.points(0, row)[:, 2].min() for row in range(b.time.size)])
@@ -40,8 +40,8 @@ class Fall:
         released = weight * self.way - lifted * (self.depth + raised / 2)
         kinetic = run.series.kinetic_energy_fluid + run.series.kinetic_energy_bodies
         self.lost = 1 - kinetic / np.where(self.under, released, np.inf)
-        edge = float(run.value("shape", "size", 1.0))
-        squares = 5 if str(run.value("shape", "kind", "")).strip() == "hexapod" else 1
+        edge = float(run.value("shape", "size"))
+        squares = 5 if run.value("shape", "kind") == "hexapod" else 1
         self.pull = (weight - lifted) / (0.5 * liquid * squares * edge**2)
 
     def at(self, depth: float) -> float:
@@ -55,9 +55,9 @@ def check(runs: list[Run]) -> Checks:
     falls: dict[str, dict[float, Fall]] = {}
     for run in runs:
         fall = Fall(run)
-        kind = str(run.value("shape", "kind", "")).strip()
-        mics = str(run.value("numerics", "coupling", "monolithic")).strip() == "mics"
-        cells = round(float(run.value("shape", "size", 1.0)) / float(run.grid.spacing[2]), 1)
+        kind = run.value("shape", "kind")
+        mics = run.value("numerics", "coupling") == "mics"
+        cells = round(float(run.value("shape", "size")) / float(run.grid.spacing[2]), 1)
         name = f"{kind}, {cells:g} cells per edge" + (", coupling mics" if mics else "")
         last = int(np.flatnonzero(fall.dry)[-1])
         exact = float(np.sqrt(2 * G * fall.way[last]))

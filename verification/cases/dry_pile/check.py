@@ -27,7 +27,7 @@ def energy(run: Run, checks: Checks, scale: float) -> None:
     """Total energy never above that at the start, but for what blocks are thrown in with."""
     s, b = run.series, run.bodies
     total = s.kinetic_energy_bodies + s.potential_energy_bodies + s.contact_energy
-    thrown = 0.5 * b.mass * float(np.sum(np.square(run.value("drop", "velocity", [0.0]))))
+    thrown = 0.5 * b.mass * float(np.sum(np.square(run.value("drop", "velocity"))))
     total = total - (b.release_time[b.dropped] < s.time[:, None]) @ thrown[b.dropped]
     gain = float((total - total[0]).max() / scale)
     name = run.folder.name

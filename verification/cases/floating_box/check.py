@@ -17,16 +17,16 @@ def tilt_deg(run: Run) -> np.ndarray:
 
 def draft_of_weight(run: Run) -> float:
     """Draft of the upright box at rest by Archimedes, water below and air above [m]."""
-    liquid = float(run.value("fluid", "liquid_density", 998.2))
-    gas = float(run.value("fluid", "gas_density", 1.204))
-    sides = np.array(run.value("shape", "size", [0.0] * 3), float)
+    liquid = float(run.value("fluid", "liquid_density"))
+    gas = float(run.value("fluid", "gas_density"))
+    sides = np.array(run.value("shape", "size"), float)
     immersed = (float(run.bodies.mass[0]) - gas * sides.prod()) / (liquid - gas)
     return float(immersed / (sides[0] * sides[1]))
 
 
 def metacentric_height(run: Run) -> float:
     """Height of the metacentre above the centre of mass of the floating upright box [m]."""
-    width, _, height = np.array(run.value("shape", "size", [0.0] * 3), float)
+    width, _, height = np.array(run.value("shape", "size"), float)
     draft = draft_of_weight(run)
     return float(width**2 / (12 * draft) + draft / 2 - height / 2)
 
@@ -40,10 +40,10 @@ def righting_arm(run: Run) -> tuple[float, float]:
     (d^2 + s^2 B^2/12)/(2 d) above the base; both turn with the box.
     """
     b = run.bodies
-    liquid = float(run.value("fluid", "liquid_density", 998.2))
-    gas = float(run.value("fluid", "gas_density", 1.204))
-    level = float(run.value("fluid", "water_level", 0.0))
-    width, _, height = np.array(run.value("shape", "size", [0.0] * 3), float)
+    liquid = float(run.value("fluid", "liquid_density"))
+    gas = float(run.value("fluid", "gas_density"))
+    level = float(run.value("fluid", "water_level"))
+    width, _, height = np.array(run.value("shape", "size"), float)
     tilt = np.radians(tilt_deg(run)[0])
     draft = (level - b.position[0, 0, 2]) / np.cos(tilt) + height / 2
     slope = np.tan(tilt)
@@ -61,7 +61,7 @@ def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
     """Mean draft over whole periods [m], the heave period [s] and the draft at every row, against
     the level that the liquid would have at rest."""
     b, high = run.bodies, run.grid.high - run.grid.low
-    sides = np.array(run.value("shape", "size", [0.0] * 3), float)
+    sides = np.array(run.value("shape", "size"), float)
     level = (run.series.liquid_volume + sides[0] * sides[1] * draft_of_weight(run)) / (
         high[0] * high[1]
     )

@@ -73,8 +73,8 @@ def check(runs: list[Run]) -> Checks:
     by_ratio: dict[float, list[Run]] = {}
     for run in runs:
         shape = run.shapes[run.bodies.shape[0]]
-        fluid = float(run.value("fluid", "liquid_density", 998.2))
-        g = float(run.value("fluid", "gravity", [0.0, 0.0, -9.81])[2])
+        fluid = float(run.value("fluid", "liquid_density"))
+        g = float(run.value("fluid", "gravity")[2])
         ratio = shape.density / fluid
         diameter = 2 * (3 * shape.volume / (4 * np.pi)) ** (1 / 3)
         theory = (ratio - 1) / (ratio + added_mass(diameter, box))
@@ -85,17 +85,17 @@ def check(runs: list[Run]) -> Checks:
             name = f"{run.folder.name}: largest speed of the surface by spin / speed"
             checks.below(name, float((spin / speed).max()), SPIN_BAND)
             continue
-        if float(run.value("run", "dt", 1e-2)) >= SHORT:
+        if float(run.value("run", "dt")) >= SHORT:
             start(run, theory * g, checks)
             continue
-        name = f"{run.folder.name}: s = {ratio:.3g}, dt = {run.value('run', 'dt', 1e-2):.2g} s"
+        name = f"{run.folder.name}: s = {ratio:.3g}, dt = {run.value('run', 'dt'):.2g} s"
         checks.close(f"{name}, a/g", acceleration(run) / g, theory, THEORY_BAND)
         sideways = float(np.abs(run.bodies.velocity[-1, 0, :2]).max())
         along = abs(float(run.bodies.velocity[-1, 0, 2]))
         checks.below(f"{name}, sideways speed / speed", sideways / along, 1e-6)
         by_ratio.setdefault(round(ratio, 6), []).append(run)
     for same in by_ratio.values():
-        finest = min(same, key=lambda run: float(run.value("run", "dt", 1e-2)))
+        finest = min(same, key=lambda run: float(run.value("run", "dt")))
         for run in same:
             if run is not finest:
                 name = f"{run.folder.name}: a against {finest.folder.name} [m/s2]"

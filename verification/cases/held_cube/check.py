@@ -22,9 +22,9 @@ def check(runs: list[Run]) -> Checks:
     drags: dict[str, dict[float, float]] = {}
     for run in runs:
         b, step = run.bodies, run.series.dt
-        edge = float(run.value("shape", "size", 1.0))
-        speed = float(run.value("boundary", "z_min_velocity", [0.0] * 3)[2])
-        density = float(run.value("fluid", "liquid_density", 998.2))
+        edge = float(run.value("shape", "size"))
+        speed = float(run.value("boundary", "z_min_velocity")[2])
+        density = float(run.value("fluid", "liquid_density"))
         pose = "edge on" if run.folder.name.startswith("edge_on") else "face on"
         area = edge**2 * (2**0.5 if pose == "edge on" else 1.0)
         width = run.grid.high - run.grid.low

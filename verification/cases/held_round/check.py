@@ -59,21 +59,21 @@ class Flow:
 def flow_of(run: Run) -> Flow:
     """What the check needs of a run."""
     b, width = run.bodies, run.grid.high - run.grid.low
-    size = np.atleast_1d(np.asarray(run.value("shape", "size", 1.0), float))
+    size = np.atleast_1d(np.asarray(run.value("shape", "size"), float))
     body, area = "sphere", np.pi / 4 * size[0] ** 2
     if len(size) > 1 and size[1] > 0:
         body = "cylinder" if size[1] >= width[2] else "finite cylinder"
         area = size[0] * size[1]
-    stream = float(run.value("boundary", "y_min_velocity", [0.0] * 3)[1])
+    stream = float(run.value("boundary", "y_min_velocity")[1])
     speed = stream - float(b.velocity[-1, 0, 1])
-    density = float(run.value("fluid", "liquid_density", 998.2))
-    viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
+    density = float(run.value("fluid", "liquid_density"))
+    viscosity = float(run.value("fluid", "liquid_viscosity"))
     return Flow(
         body=body,
         reynolds=density * speed * size[0] / viscosity,
         cells=round(float(size[0] / run.grid.spacing[0]), 1),
         moved=stream == 0,
-        half=float(run.value("run", "cfl_max", 0.5)) < 1,
+        half=float(run.value("run", "cfl_max")) < 1,
         share=float(area / (width[0] * width[2])),
         way=b.time * speed / size[0],
         step=run.series.dt,

@@ -28,11 +28,11 @@ def check(runs: list[Run]) -> Checks:
     drags: dict[int, dict[float, float]] = {}
     long: dict[str, float] = {}
     for run in runs:
-        b, diameter = run.bodies, float(run.value("shape", "size", 1.0))
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        stream = float(run.value("fluid", "velocity", [0.0] * 3)[2])
+        b, diameter = run.bodies, float(run.value("shape", "size"))
+        density = float(run.value("fluid", "liquid_density"))
+        stream = float(run.value("fluid", "velocity")[2])
         speed = stream - float(b.velocity[-1, 0, 2])
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
+        viscosity = float(run.value("fluid", "liquid_viscosity"))
         reynolds = round(density * speed * diameter / viscosity)
         way, step = b.time * speed / diameter, run.series.dt
         late = way > way[-1] - LATE
@@ -41,7 +41,7 @@ def check(runs: list[Run]) -> Checks:
         mean = (force[late] * step[late, None]).sum(axis=0) / step[late].sum()
         cells = round(diameter / float(run.grid.spacing[2]), 1)
         if run.grid.z[-1] > 15 * diameter:
-            courant = float(run.value("run", "cfl_max", 0.5))
+            courant = float(run.value("run", "cfl_max"))
             name = "held" if stream else f"moved, Courant number {courant:g}"
             long[name] = float(mean[2])
         else:

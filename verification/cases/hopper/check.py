@@ -31,7 +31,7 @@ def load(run: Run, checks: Checks) -> None:
     """The load leaves the hopper, goes downstream and comes to rest on the ground."""
     b, free = run.bodies, ~run.bodies.fixed
     start, end = b.position[0, free], b.position[-1, free]
-    checks.true("settled before the end", b.time[-1] < float(run.value("run", "t_end", 0.0)))
+    checks.true("settled before the end", b.time[-1] < float(run.value("run", "t_end")))
     checks.below("highest rock at the end [m]", float(end[:, 2].max()), LAYERS)
     inside = ((end > run.grid.low) & (end < run.grid.high)).all()
     checks.true("all within the tank", inside)

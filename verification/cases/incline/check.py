@@ -28,9 +28,9 @@ def check(runs: list[Run]) -> Checks:
     checks = Checks("incline")
     for run in runs:
         b = run.bodies
-        g = np.array(run.value("fluid", "gravity", [0.0, 0.0, -9.81]))
+        g = np.array(run.value("fluid", "gravity"))
         theta = float(np.degrees(np.arctan2(g[0], -g[2])))
-        mu = float(run.value("contact", "wall_friction", 0.0))
+        mu = float(run.value("contact", "wall_friction"))
         _, _, block, sphere = next(r for r in ROWS if np.allclose(r[:2], (theta, mu)))
         name = f"{run.folder.name}:"
         if block > 0.0:

@@ -18,12 +18,12 @@ def check(runs: list[Run]) -> Checks:
     drags: dict[tuple[str, str], float] = {}
     for run in runs:
         b = run.bodies
-        kind = str(run.value("shape", "kind", "sphere"))
-        size = np.atleast_1d(run.value("shape", "size", 1.0)).astype(float)
+        kind = str(run.value("shape", "kind"))
+        size = np.atleast_1d(run.value("shape", "size")).astype(float)
         diameter = float(size[0])
         area = diameter * float(size[1]) if kind == "cylinder" else np.pi * diameter**2 / 4
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        stream = np.array(run.value("fluid", "velocity", [0.0] * 3), dtype=float)
+        density = float(run.value("fluid", "liquid_density"))
+        stream = np.array(run.value("fluid", "velocity"), dtype=float)
         past = stream - b.velocity[-1, 0]
         speed = float(np.linalg.norm(past))
         along = past / speed
@@ -32,7 +32,7 @@ def check(runs: list[Run]) -> Checks:
         late = way > SETTLED
         mean = (force[late] * step[late, None]).sum(axis=0) / step[late].sum()
         drag = float(mean @ along)
-        courant = float(run.value("run", "cfl_max", 0.5))
+        courant = float(run.value("run", "cfl_max"))
         cells = round(diameter / float(run.grid.spacing[0]))
         oblique = ", oblique" if np.count_nonzero(np.abs(along) > 1e-9) > 1 else ""
         flow = f"{kind} of {cells} cells{oblique}, Courant number {courant:g}"

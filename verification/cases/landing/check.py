@@ -57,7 +57,7 @@ def rise_of(run: Run, name: str, checks: Checks) -> None:
     solid = frame.solid.astype(float)
     height = float((solid + (1.0 - solid) * frame.liquid).mean() * length[2])
     wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / area
-    level = float(run.value("fluid", "water_level", 0.0))
+    level = float(run.value("fluid", "water_level"))
     checks.close(f"{name}: rise of the level [m]", height - level, wanted, LEVEL_BAND)
 
 

@@ -35,7 +35,7 @@ def check(runs: list[Run]) -> Checks:
             )
         else:
             shape = run.shapes[b.shape[0]]
-            density = float(run.value("fluid", "liquid_density", 998.2))
+            density = float(run.value("fluid", "liquid_density"))
             excess = (shape.density - density) * shape.volume * 9.81
             scale, said = float(excess * budget.time[last]), "impulse of its weight under water"
             lost = budget.kinetic + budget.potential

@@ -14,7 +14,7 @@ def check(runs: list[Run]) -> Checks:
     checks, curves = Checks("moved cube"), {}
     for run in runs:
         b, h = run.bodies, float(run.grid.spacing[2])
-        cells = float(run.value("shape", "size", 1.0)) / h
+        cells = float(run.value("shape", "size")) / h
         speed = -float(b.velocity[0, 0, 2])
         weight = float(run.shapes["cube"].density * run.shapes["cube"].volume * G)
         force, way = b.fluid_force[:, 0, 2] / weight, b.time * speed / h

@@ -26,7 +26,7 @@ def waves(run: Run, reference: Run, checks: Checks) -> None:
     for t in run.field_times:
         undisturbed = depths(reference, t)
         worst = max(worst, float(np.abs(depths(run, t) - undisturbed[:n]).max()))
-        level = float(run.value("fluid", "water_level", 0.0))
+        level = float(run.value("fluid", "water_level"))
         incident = max(incident, float(abs(undisturbed[n - 1] - level)))
     name = run.folder.name
     checks.below(f"{name} waves: part that comes back", worst / incident, REFLECTED[name])

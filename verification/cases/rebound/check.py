@@ -37,9 +37,9 @@ def approach(checks: Checks, runs: list[Run]) -> None:
     """Resistance of the film under a sphere that is moved to the floor."""
     curves, wanted = {}, {}
     for run in runs:
-        b, radius = run.bodies, float(run.value("shape", "size", 1.0)) / 2
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
-        film = bool(run.value("contact", "lubrication", False))
+        b, radius = run.bodies, float(run.value("shape", "size")) / 2
+        viscosity = float(run.value("fluid", "liquid_viscosity"))
+        film = bool(run.value("contact", "lubrication"))
         speed = -float(b.velocity[-1, 0, 2])
         gap = (b.position[:, 0, 2] - radius + 0.5 * speed * run.series.dt) / radius  # of the step
         force = b.fluid_force[:, 0, 2] + b.contact_force[:, 0, 2]
@@ -68,11 +68,11 @@ def check(runs: list[Run]) -> Checks:
         top = float(gaps[times > 0].max())
         curves, heights = {}, {}
         for run in falls:
-            viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
+            viscosity = float(run.value("fluid", "liquid_viscosity"))
             if (viscosity > 0.05) != (name == "St27"):
                 continue
-            film = bool(run.value("contact", "lubrication", False))
-            b, diameter = run.bodies, float(run.value("shape", "size", 1.0))
+            film = bool(run.value("contact", "lubrication"))
+            b, diameter = run.bodies, float(run.value("shape", "size"))
             gap = b.position[:, 0, 2] - diameter / 2
             struck = int(np.flatnonzero(b.contacts[:, 0] > 0)[0])
             cells = round(diameter / float(run.grid.spacing[2]), 1)

@@ -33,7 +33,7 @@ def check(runs: list[Run]) -> Checks:
     checks = Checks("rest heights of a hexapod")
     for run in runs:
         b, name = run.bodies, run.folder.name
-        counts = run.value("contact", "model", "surface") == "surface"
+        counts = run.value("contact", "model") == "surface"
         for k, (height, legs) in enumerate(zip(HEIGHTS, LEGS, strict=True)):
             on = f"{name}, {k + 1} leg{'s' if k else ''}:"
             ours = 1e3 * float(b.position[-1, k, 2])

@@ -27,18 +27,18 @@ def check(runs: list[Run]) -> Checks:
     for run in runs:
         b, block = run.bodies, run.shapes["block"]
         case = run.folder.name.rpartition("_")[0] or "Re100"
-        edge = float(run.value("shape", "size", 1.0))
+        edge = float(run.value("shape", "size"))
         diameter = (6 * block.volume / np.pi) ** (1 / 3)
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0)) / density
-        stream = float(run.value("boundary", "z_min_velocity", [0.0] * 3)[2])
+        density = float(run.value("fluid", "liquid_density"))
+        viscosity = float(run.value("fluid", "liquid_viscosity")) / density
+        stream = float(run.value("boundary", "z_min_velocity")[2])
         speed = stream - b.velocity[:, 0, 2]
         late = b.time > 0.5 * b.time[-1]
         mean = float((speed[late] * run.series.dt[late]).sum() / run.series.dt[late].sum())
         cells = round(edge / float(run.grid.spacing[2]), 1)
         cd = 4 / 3 * (block.density / density - 1) * 9.81 * diameter / mean**2
         reynolds = mean * diameter / viscosity
-        cube = str(run.value("shape", "kind", "cube")).strip() == "cube"
+        cube = run.value("shape", "kind") == "cube"
         exact = drag_coefficient(reynolds, CUBE if cube else HEXAPOD)
         name = f"{case.replace('_', ' ')}, {cells:g} cells per edge, Re = {reynolds:.4g}"
         counts = reynolds < 500 and cells > 7

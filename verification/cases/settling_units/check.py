@@ -25,9 +25,9 @@ def check(runs: list[Run]) -> Checks:
     speeds: dict[str, dict[float, float]] = {}
     for run in runs:
         b, unit, width = run.bodies, run.shapes["unit"], run.grid.high - run.grid.low
-        kind = str(run.value("shape", "kind", "")).strip()
+        kind = run.value("shape", "kind")
         height = float(width[0]) / 4
-        stream = float(run.value("boundary", "z_min_velocity", [0.0] * 3)[2])
+        stream = float(run.value("boundary", "z_min_velocity")[2])
         speed, step = stream - b.velocity[:, 0, 2], run.series.dt
         part = np.floor((b.time / b.time[-1] - 0.5) * 2 * QUARTERS).clip(-1, QUARTERS - 1)
         means = [
@@ -41,7 +41,7 @@ def check(runs: list[Run]) -> Checks:
         name = f"{flow}, {cells:g} cells"
         speeds.setdefault(flow, {})[cells] = mean
         diameter = (6 * unit.volume / np.pi) ** (1 / 3)
-        density = float(run.value("fluid", "liquid_density", 998.2))
+        density = float(run.value("fluid", "liquid_density"))
         drag = 4 / 3 * (unit.density / density - 1) * G * diameter / mean**2
         blocked = 2 * MASKELL * np.pi / 4 * diameter**2 / float(width[0] * width[1])
         wide = float((np.sqrt(1 + 2 * blocked * drag) - 1) / blocked)

@@ -23,7 +23,7 @@ def check(runs: list[Run]) -> Checks:
         radius = 0.02
         speed, along = b.velocity[:, 0, 0], b.position[:, 0, 0] - b.position[0, 0, 0]
         slip = speed - radius * b.angular_velocity[:, 0, 1]
-        mu = float(run.value("contact", "wall_friction", 0.0))
+        mu = float(run.value("contact", "wall_friction"))
         row = next(r for r in ROWS if np.allclose(r[:2], (speed[0], mu)))
         v0, _, v_roll, t_roll, x_roll = row
         rolling = int(np.argmax(slip <= 0.01 * v0))  # first row

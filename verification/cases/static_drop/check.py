@@ -20,8 +20,8 @@ def check(runs: list[Run]) -> Checks:
     for run in runs:
         name = run.folder.name
         radius, main_curvatures = SHAPES[name]
-        sigma = float(run.value("fluid", "surface_tension", 0.0))
-        mu = float(run.value("fluid", "liquid_viscosity", 0.0))
+        sigma = float(run.value("fluid", "surface_tension"))
+        mu = float(run.value("fluid", "liquid_viscosity"))
         state = run.restart()
         speed = float(np.abs(state["flow/u"]).max())
         checks.below(f"{name}: capillary number", speed * mu / sigma, CAPILLARY_BAND)

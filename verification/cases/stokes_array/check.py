@@ -32,10 +32,10 @@ def check(runs: list[Run]) -> Checks:
     """Drag from the mean flow that a given force drives, and from the force on the sphere."""
     checks, study, same_grid = Checks("Stokes flow through an array of spheres"), {}, {}
     for run in runs:
-        edge, g = float(run.grid.high[0]), float(run.value("fluid", "gravity", [0.0] * 3)[0])
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
-        diameter = float(run.value("shape", "size", 1.0))
+        edge, g = float(run.grid.high[0]), float(run.value("fluid", "gravity")[0])
+        density = float(run.value("fluid", "liquid_density"))
+        viscosity = float(run.value("fluid", "liquid_viscosity"))
+        diameter = float(run.value("shape", "size"))
         cells = diameter / float(run.grid.spacing[0])
         volume = run.shapes["sphere"].volume
         flow = mean_velocity(run)

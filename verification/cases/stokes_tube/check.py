@@ -33,8 +33,8 @@ def check(runs: list[Run]) -> Checks:
         radius = float(np.linalg.norm(tube.points[:, :2], axis=1).min())
         ratio = round(diameter / 2 / radius, 2)
         cells = round(diameter / float(run.grid.spacing[2]), 1)
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
+        density = float(run.value("fluid", "liquid_density"))
+        viscosity = float(run.value("fluid", "liquid_viscosity"))
         weight = (sphere.density - density) * sphere.volume * 9.81
         speed = -b.velocity[:, 1, 2]
         late = b.time > 0.8 * b.time[-1]

@@ -47,9 +47,9 @@ def exact_start(run: Run, end: float) -> tuple:
     Equation of Boussinesq and Basset: displaced liquid, half of it as added mass, Stokes drag and
     history. Exact while the way is short against the diameter, before the liquid's own convection
     and the walls are felt."""
-    liquid = float(run.value("fluid", "liquid_density", 0.0))
-    viscosity = float(run.value("fluid", "liquid_viscosity", 0.0))
-    solid, radius = run.shapes["sphere"].density, float(run.value("shape", "size", 0.0)) / 2
+    liquid = float(run.value("fluid", "liquid_density"))
+    viscosity = float(run.value("fluid", "liquid_viscosity"))
+    solid, radius = run.shapes["sphere"].density, float(run.value("shape", "size")) / 2
     steps, volume = 2000, 4 / 3 * np.pi * radius**3
     dt = end / steps
     inertia = (solid + liquid / 2) * volume / dt
@@ -76,7 +76,7 @@ def check(runs: list[Run]) -> Checks:
         curves, peaks, heights = {}, {}, {}
         times, speeds = measured(f"{case}_velocity.csv")
         for run in sorted(mine, key=lambda r: -r.grid.spacing[0]):
-            diameter = float(run.value("shape", "size", 0.0))
+            diameter = float(run.value("shape", "size"))
             cells = round(diameter / float(run.grid.spacing[0]), 1)
             b = run.bodies
             speed = -b.velocity[:, 0, 2]

@@ -22,7 +22,7 @@ MADE = 3e-3  # of weight times height
 
 def blocks(run: Run, checks: Checks) -> None:
     """All are let go, fall, and come to rest on the slope or on one another."""
-    bodies, t_end = run.bodies, float(run.value("run", "t_end", 0.0))
+    bodies, t_end = run.bodies, float(run.value("run", "t_end"))
     checks.true("settled before the end", bodies.time[-1] < t_end, f"{bodies.time[-1]:.1f} s")
     checks.true("all let go", np.isfinite(bodies.release_time).all())
     at, start = bodies.position[-1], bodies.position[0]

@@ -14,7 +14,7 @@ def check(runs: list[Run]) -> Checks:
     """Liquid of each basin in every restart file against the volume of the start."""
     checks = Checks("two basins")
     for run in runs:
-        level = float(run.value("fluid", "water_level", 0.0))
+        level = float(run.value("fluid", "water_level"))
         width = run.grid.high[1] - run.grid.low[1]
         wall = run.points(0, 0)[:, 0]
         block = run.points(1, 0)[:, 2]

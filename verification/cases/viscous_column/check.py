@@ -59,10 +59,9 @@ def collapse(run: Run) -> Collapse:
         return Collapse(
             name, step, s.time, s.kinetic_energy_fluid + s.kinetic_energy_bodies, free, FREE_FALL
         )
-    none = [0.0] * 3
-    low, high = (np.array(run.value("water", corner, none), float) for corner in ("min", "max"))
+    low, high = (np.array(run.value("water", corner), float) for corner in ("min", "max"))
     edge = high - low
-    weight = GRAVITY * float(run.value("fluid", "liquid_density", 0.0)) * float(np.prod(edge))
+    weight = GRAVITY * float(run.value("fluid", "liquid_density")) * float(np.prod(edge))
     level = float(np.prod(edge) / np.prod((run.grid.high - run.grid.low)[:2]))
     free = np.full(s.time.size, 0.5 * weight * (low[2] + high[2] - level))
     return Collapse(name, step, s.time, s.kinetic_energy_fluid, free, 1.0)

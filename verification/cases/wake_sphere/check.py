@@ -32,11 +32,11 @@ def check(runs: list[Run]) -> Checks:
     exact, curves = known["in_the_box"], {}
     for run in runs:
         b, sphere = run.bodies, run.shapes["sphere"]
-        diameter = float(run.value("shape", "size", 1.0))
-        density = float(run.value("fluid", "liquid_density", 998.2))
-        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0)) / density
+        diameter = float(run.value("shape", "size"))
+        density = float(run.value("fluid", "liquid_density"))
+        viscosity = float(run.value("fluid", "liquid_viscosity")) / density
         unit = float(np.sqrt((sphere.density / density - 1) * 9.81 * diameter))
-        stream = float(run.value("boundary", "z_min_velocity", [0.0] * 3)[2])
+        stream = float(run.value("boundary", "z_min_velocity")[2])
         speed = (stream - b.velocity[:, 0, 2]) / unit
         cells = round(diameter / float(run.grid.spacing[2]), 1)
         name = f"{cells:g} cells per diameter"

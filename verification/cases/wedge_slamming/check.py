@@ -27,12 +27,12 @@ def check(runs: list[Run]) -> Checks:
     curves, wanted = {}, {}
     for run in runs:
         b = run.bodies
-        angle = int(re.findall(r"\d+", str(run.value("shape", "file", "")))[-1])
+        angle = int(re.findall(r"\d+", str(run.value("shape", "file")))[-1])
         tip = b.position[:, 0, 2] + float(run.shapes["wedge"].points[:, 2].min())
-        depth = float(run.value("fluid", "water_level", 0.0)) - tip
+        depth = float(run.value("fluid", "water_level")) - tip
         speed = -float(b.velocity[-1, 0, 2])
         length = float(run.grid.high[1])
-        density = float(run.value("fluid", "liquid_density", 998.2))
+        density = float(run.value("fluid", "liquid_density"))
         force = 2 * b.fluid_force[:, 0, 2] / length  # of the whole wedge
         unit = density * speed**2 * depth
         late = depth > 0.5 * depth[-1]

@@ -26,13 +26,11 @@ def check(runs: list[Run]) -> Checks:
     checks, found = Checks("bounce under water"), []
     wanted = 0.9
     for run in runs:
-        wanted = float(run.value("contact", "restitution", 0.3))
-        share = float(run.value("run", "dt", 0.0)) / float(
-            run.value("contact", "contact_time", 2e-3)
-        )
+        wanted = float(run.value("contact", "restitution"))
+        share = float(run.value("run", "dt")) / float(run.value("contact", "contact_time"))
         value = restitution(run)
         cells = round(DIAMETER / float(run.grid.spacing[0]))
-        solver = str(run.value("contact", "solver", "springs"))
+        solver = str(run.value("contact", "solver"))
         name = f"{solver}, step {share:g} contact times, {cells} cells per diameter: restitution"
         checks.close(name, value, wanted, BAND)
         if cells == COARSE and solver == "springs":
