@@ -30,7 +30,7 @@ import f90nml
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from measures.checks import Checks  # noqa: E402
+from measures.checks import Checks, sound  # noqa: E402
 from micstools.reading.reader import Run  # noqa: E402
 
 CASES = ROOT / "verification" / "cases"
@@ -169,8 +169,8 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
 
 
 def checker(case: str) -> ModuleType:
-    """The check.py of a case: `check(runs)`, and `VARIES` if its runs leave the defaults. It may
-    import modules beside it, whose names must differ from case to case."""
+    """The check.py of a case: `check(runs, checks)`, and `VARIES` if its runs leave the defaults.
+    It may import modules beside it, whose names must differ from case to case."""
     path = CASES / case / "check.py"
     spec = importlib.util.spec_from_file_location(f"check_{case}", path)
     if spec is None or spec.loader is None:
@@ -184,6 +184,15 @@ def checker(case: str) -> ModuleType:
     return module
 
 
+def judge(name: str, runs: list[Run]) -> Checks:
+    """The check of a case on its runs, and what has to hold in each of them."""
+    checks = Checks(name)
+    checker(name).check(runs, checks)
+    for run in runs:
+        sound(run, checks)
+    return checks
+
+
 def verify(name: str, out: Path, machine: Machine, plans: list[Planned]) -> tuple[bool, str]:
     """Run these of a case, and its check; whether it holds, and the report."""
     folders, lines = [], []
@@ -192,7 +201,7 @@ def verify(name: str, out: Path, machine: Machine, plans: list[Planned]) -> tupl
         seconds = run(case, folder, machine)
         lines.append(f"{name}/{plan.name}: {seconds:.1f} s")
         folders.append(folder)
-    checks: Checks = checker(name).check([Run(folder) for folder in folders])
+    checks = judge(name, [Run(folder) for folder in folders])
     return checks.failed == 0, "\n".join([*lines, checks.text(), ""])
 
 

@@ -21,7 +21,18 @@ from pathlib import Path
 
 from micstools.cases import initial_state
 from report import Case, Finished, note_options, write
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, Planned, Run, checker, names, planned
+from run_cases import (
+    CASES,
+    MPI_SETTINGS,
+    ROOT,
+    Machine,
+    Planned,
+    Run,
+    checker,
+    judge,
+    names,
+    planned,
+)
 
 OUT = ROOT / "build" / "verify"
 REPORT = ROOT / "verification" / "report"
@@ -180,7 +191,7 @@ def main() -> int:
         good = [Run(run.folder) for run in sorted(mine, key=lambda r: r.name) if run.good]
         try:
             alone = not every[name] and getattr(module, "COST", 0.0) <= wanted.cost
-            case.checks = module.check(good) if good or alone else None
+            case.checks = judge(name, good) if good or alone else None
         except Exception as problem:  # a check must not take the report with it
             case.problem = f"check.py: {type(problem).__name__}: {problem}"
         note_options(case, plain)

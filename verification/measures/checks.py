@@ -2,8 +2,7 @@
 against resolution. A case's `check.py` fills a `Checks`; pytest and the report read it.
 """
 
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -182,11 +181,6 @@ class Checks:
             lines.append(f"    observed order: {', '.join(f'{p:.2f}' for p in s.orders) or '-'}")
         return "\n".join(lines)
 
-    def report(self) -> int:
-        """Print the tables; 0 when every row holds, else 1."""
-        print(self.text())
-        return int(self.failed > 0)
-
     def _add(
         self,
         quantity: str,
@@ -225,11 +219,3 @@ def _sound(run: Run, here: str, checks: Checks) -> None:
         worst = float(np.abs(uneven_divergence(run, run.restart(name))).max())
         said = f"{here}: divergence from the faces in {name} [1/s]"
         checks.below(said, worst, tolerance, claims)
-
-
-def main(check: Callable[[list[Run]], Checks]) -> None:
-    """Run a check on the result folders given on the command line and exit with its verdict."""
-    if len(sys.argv) < 2:
-        print(f"usage: {sys.argv[0]} RUN [RUN ...]", file=sys.stderr)
-        raise SystemExit(2)
-    raise SystemExit(check([Run(folder) for folder in sys.argv[1:]]).report())

@@ -3,7 +3,7 @@
 import numpy as np
 from potential import circle_in_square, sphere_in_cube
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 VARIES = ("numerics coupling",)
@@ -23,9 +23,8 @@ def added_mass(run: Run) -> float:
     return 9.81 * (1 - ratio) / acceleration - ratio
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Added mass of every run; errors over resolution for each box."""
-    checks = Checks("added mass")
     exact: dict[tuple[str, float], float] = {}
     studies: dict[tuple[str, float], dict[float, float]] = {}
     for run in runs:
@@ -47,8 +46,6 @@ def check(runs: list[Run]) -> Checks:
         checks.below(f"{name}: sideways speed / speed", sideways, 1e-6, gated)
         if coupling == "monolithic" and cells == round(cells):
             studies[box][cells] = found
-        sound(run, checks)
     for box, values in studies.items():
         title = f"added mass of a {box[0]}, box {box[1] / 0.06:g} diameters wide"
         checks.study(title, values, exact[box], "cells per diameter")
-    return checks

@@ -1,6 +1,6 @@
 """Added mass of blocks that touch a wall, along its normal."""
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 QUICK = ("cells_08", "hexapod_*")
@@ -15,9 +15,8 @@ def added_mass(run: Run) -> float:
     return 9.81 * (1 - ratio) / float(b.velocity[-1, 0, 2] / b.time[-1]) - ratio
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """The sphere against potential flow; of the others how far they are from a sphere."""
-    checks = Checks("added mass at a wall")
     spheres: dict[float, float] = {}
     for run in runs:
         shape, found = run.bodies.shape[0], added_mass(run)
@@ -29,6 +28,4 @@ def check(runs: list[Run]) -> Checks:
         checks.close(
             f"{shape}, {cells}: added mass / displaced mass", found, TOUCHING, band, sphere
         )
-        sound(run, checks)
     checks.study("added mass of a sphere at a wall", spheres, TOUCHING, "cells per diameter")
-    return checks

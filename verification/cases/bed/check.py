@@ -1,11 +1,8 @@
-"""A bed of any form is a floor for blocks and for water.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A bed of any form is a floor for blocks and for water."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Array, Run
 
 VARIES = ("contact wall_friction", "contact sleep", "contact model")
@@ -106,9 +103,8 @@ def drop(run: Run, checks: Checks) -> None:
     checks.below(f"{name}: overlap at the end [m]", float(run.series.max_overlap[-1]), 2e-5)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Slopes, a groove, flat beds against floors, still water."""
-    checks = Checks("bed")
     named = {run.folder.name: run for run in runs}
     for name, run in named.items():
         if name.startswith("slope"):
@@ -122,9 +118,3 @@ def check(runs: list[Run]) -> Checks:
             still(run, checks)
         elif name == "drop":
             drop(run, checks)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

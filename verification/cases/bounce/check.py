@@ -1,13 +1,10 @@
-"""Blocks bounce with the restitution asked for, or as their spring and dashpot say.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Blocks bounce with the restitution asked for, or as their spring and dashpot say."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).parent
@@ -149,9 +146,8 @@ def power_law(run: Run, checks: Checks) -> None:
         checks.close(f"{name} duration [k=m=1]", float(took), duration, BAND)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each run by its kind."""
-    checks = Checks("bounces")
     for run in runs:
         kind = run.folder.name
         if kind.startswith("ball"):
@@ -160,9 +156,3 @@ def check(runs: list[Run]) -> Checks:
             power_law(run, checks)
         else:
             restitution(run, checks)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,11 +1,8 @@
-"""A small capillary wave against the exact solution.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A small capillary wave against the exact solution."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from measures.waves import prosperetti_two_fluids, standing_amplitude
 from micstools.reading.reader import Run
 
@@ -14,9 +11,9 @@ COUNTS_FROM = 32  # cells per wavelength
 WAVENUMBER, AMPLITUDE = 2 * np.pi, 0.01
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Root mean square of the difference in amplitude."""
-    checks, errors, ours, exact = Checks("capillary wave"), {}, {}, {}
+    errors, ours, exact = {}, {}, {}
     for run in runs:
         name, cells = run.folder.name, round(1.0 / run.grid.spacing[0])
         rho = tuple(float(run.value("fluid", f"{of}_density")) for of in ("liquid", "gas"))
@@ -31,11 +28,5 @@ def check(runs: list[Run]) -> Checks:
         if name.startswith("cells"):
             errors[cells] = error
         ours[name], exact[name] = (time, amplitude / AMPLITUDE), (time, reference)
-        sound(run, checks)
     checks.study("rms difference in amplitude", errors, 0.0, "cells per wavelength")
     checks.figure("amplitude", "t [s]", "a/a0", ours, exact, smooth=True)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

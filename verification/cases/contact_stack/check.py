@@ -1,11 +1,8 @@
-"""Stacked cubes stand and a hooked hexapod hangs.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Stacked cubes stand and a hooked hexapod hangs."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 WAY = 0.5  # [mm]
@@ -16,9 +13,8 @@ VARIES = ("contact sleep", "contact solver")
 QUICK = ("impulses",)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """How far each part has moved and turned at the end, and its creep, free of any sway."""
-    checks = Checks("stacks and hooks")
     for run in runs:
         b = run.bodies
         moved = np.linalg.norm(b.position[-1] - b.position[0], axis=1)
@@ -35,9 +31,3 @@ def check(runs: list[Run]) -> Checks:
             checks.below(f"{name} creep [m/s]", float(creep[part].max()), CREEP)
         held = int(b.contacts[-1, 21])
         checks.true("the hooked hexapod touches one body", held == 1, f"{held}")
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

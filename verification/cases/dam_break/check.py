@@ -1,15 +1,12 @@
 """Collapse of a column of water: front and height against experiments and another program, and
-what must hold whatever an experiment does: the exact force at the start, and energy.
-
-usage: python check.py RUN [RUN ...]
-"""
+what must hold whatever an experiment does: the exact force at the start, and energy."""
 
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 BAND = 0.05  # of the position of the front
@@ -98,9 +95,9 @@ def worst(time: Values, value: Values, reference: Values, scale: Values, shift: 
     return float(np.abs((found - reference[:, 1]) / scale).max())
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """One shift for all times of a run makes up for the gate; it fits the front."""
-    checks, ours, measured = Checks("dam break"), {}, {}
+    ours, measured = {}, {}
     for run in runs:
         name = run.folder.name
         base, ratio = SIZES[name]
@@ -137,10 +134,4 @@ def check(runs: list[Run]) -> Checks:
             error = worst(time, height / base, drop, np.ones(len(drop)), shift)
             checks.below(f"{name}: largest error of the height", error, HEIGHT_BAND)
         ours[name], measured[name] = (time - shift, front), (rows[:, 0], rows[:, 1])
-        sound(run, checks)
     checks.figure("front", "T", "Z", ours, measured)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

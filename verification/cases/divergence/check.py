@@ -1,24 +1,14 @@
-"""The face velocity that the next step uses is free of divergence, solids included.
+"""The face velocity that the next step uses is free of divergence, solids included."""
 
-usage: python check.py RUN [RUN ...]
-"""
-
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 VARIES = ("numerics coupling",)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Recompute the divergence from the faces of every restart file, while a block moves."""
-    checks = Checks("divergence")
     for run in runs:
         moving = float(abs(run.bodies.velocity[:, -1, 2]).max())
         checks.true("the block moves", moving > 0.1, f"{moving:.3f} m/s")
         checks.true("restart files are there", len(run.restart_files) == 2)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 G = 9.81
@@ -49,9 +49,9 @@ class Fall:
         return float(np.interp(depth, self.depth, self.speed))
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Speeds in the air, at depths in the water, and what becomes of the energy."""
-    checks, curves = Checks("drop tower"), {}
+    curves = {}
     falls: dict[str, dict[float, Fall]] = {}
     for run in runs:
         fall = Fall(run)
@@ -79,7 +79,6 @@ def check(runs: list[Run]) -> Checks:
         )
         falls.setdefault(kind + (", mics" if mics else ""), {})[cells] = fall
         curves[name] = (fall.depth, fall.speed)
-        sound(run, checks)
     for kind, of_kind in falls.items():
         fine = max(of_kind)
         for depth in WAYS:
@@ -100,7 +99,6 @@ def check(runs: list[Run]) -> Checks:
                 counts=False,
             )
     checks.figure("speed over depth of the centre under the still water", "m", "m/s", curves)
-    return checks
 
 
 VARIES = ("numerics coupling",)

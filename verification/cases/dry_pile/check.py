@@ -1,11 +1,8 @@
-"""Piles and clouds of blocks keep energy and momentum, and cubes pack as cubes do.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Piles and clouds of blocks keep energy and momentum, and cubes pack as cubes do."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import place, volume_in_box
 
@@ -108,9 +105,8 @@ def pile(run: Run, checks: Checks) -> None:
         checks.true("smooth cubes pack denser than any rough ones", whole > DENSEST, f"{whole:.3f}")
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each run by its kind."""
-    checks = Checks("dry piles")
     for run in runs:
         s = run.series
         fallen = s.potential_energy_bodies[0] - s.potential_energy_bodies.min()
@@ -121,9 +117,3 @@ def check(runs: list[Run]) -> Checks:
             balance(run, checks)
         if run.folder.name in PILES:
             pile(run, checks)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 DRAFT_BAND, ARM_BAND = 0.01, 1e-6
@@ -74,16 +74,15 @@ def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
     return float(d[whole].mean()), period, draft
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each upright box: draft and period; each tilted one: whether it comes back."""
-    checks, study, curves = Checks("floating box"), {}, {}
+    study, curves = {}, {}
     for run in runs:
         name, b = run.folder.name, run.bodies
         if name.endswith("held"):
             ours, arm = righting_arm(run)
             said = f"{name.split('_')[0]} box held at {tilt_deg(run)[0]:.0f} deg"
             checks.close(f"{said}: righting arm / sine [mm]", 1e3 * ours, 1e3 * arm, ARM_BAND)
-            sound(run, checks)
             continue
         if name.endswith("tilted"):
             tilt, metacentre = tilt_deg(run), 1e3 * metacentric_height(run)
@@ -94,7 +93,6 @@ def check(runs: list[Run]) -> Checks:
                 checks.true(f"{said} comes back", tilt.max() < 1.05 * tilt[0], figures)
             else:
                 checks.true(f"{said} capsizes", last > 45, figures)
-            sound(run, checks)
             continue
         expected = draft_of_weight(run)
         found, period, draft = mean_draft(run)
@@ -106,7 +104,6 @@ def check(runs: list[Run]) -> Checks:
         study[cells] = found
         curves[name] = (b.time, 1e3 * draft)
         reference = expected
-        sound(run, checks)
     if curves:
         checks.figure(
             "draft",
@@ -117,4 +114,3 @@ def check(runs: list[Run]) -> Checks:
             smooth=True,
         )
         checks.study("mean draft [m]", study, reference, "cells per height")
-    return checks

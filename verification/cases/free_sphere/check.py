@@ -5,7 +5,7 @@ usage: python check.py RUN [RUN ...]; runs that differ in dt only are compared w
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 VARIES = (  # of one run
@@ -66,9 +66,8 @@ def start(run: Run, theory: float, checks: Checks) -> None:
         checks.close(f"{name}, speed [m/s]", speed, theory * t[row], START_BAND)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each run against theory, and those of a density against the one with the shortest step."""
-    checks = Checks("released sphere")
     box = float((runs[0].grid.high - runs[0].grid.low)[2])
     by_ratio: dict[float, list[Run]] = {}
     for run in runs:
@@ -78,7 +77,6 @@ def check(runs: list[Run]) -> Checks:
         ratio = shape.density / fluid
         diameter = 2 * (3 * shape.volume / (4 * np.pi)) ** (1 / 3)
         theory = (ratio - 1) / (ratio + added_mass(diameter, box))
-        sound(run, checks)
         if run.folder.name.endswith("spin"):
             spin = np.linalg.norm(run.bodies.angular_velocity[1:, 0], axis=1) * diameter / 2
             speed = np.linalg.norm(run.bodies.velocity[1:, 0], axis=1)
@@ -100,8 +98,3 @@ def check(runs: list[Run]) -> Checks:
             if run is not finest:
                 name = f"{run.folder.name}: a against {finest.folder.name} [m/s2]"
                 checks.close(name, acceleration(run), acceleration(finest), STEP_BAND)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

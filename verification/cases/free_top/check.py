@@ -1,11 +1,8 @@
-"""A torque-free box keeps angular momentum and energy.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A torque-free box keeps angular momentum and energy."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -24,9 +21,8 @@ def matrix(q: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Angular momentum and energy at every row, from attitude, angular velocity and inertia."""
-    checks = Checks("free top")
     for run in runs:
         b = run.bodies
         turn, omega = matrix(b.quaternion[:, 0]), b.angular_velocity[:, 0]
@@ -44,9 +40,3 @@ def check(runs: list[Run]) -> Checks:
         moved = float(np.linalg.norm(b.position[:, 0] - b.position[0, 0], axis=1).max())
         checks.below("way of the centroid [m]", moved, 1e-15)
         checks.figure("energy", "t [s]", "E/E0 - 1", {"mics": (b.time, energy / energy[0] - 1.0)})
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

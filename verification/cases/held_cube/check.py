@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HOERNER = {"face on": 1.05, "edge on": 0.80}  # on the projected area
@@ -16,9 +16,9 @@ def in_the_box(drag: float, share: float) -> float:
     return drag * (1 + BLOCKAGE * drag * share)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Mean drag and scatter of drag and lift of each run."""
-    checks, curves = Checks("held cube"), {}
+    curves = {}
     drags: dict[str, dict[float, float]] = {}
     for run in runs:
         b, step = run.bodies, run.series.dt
@@ -46,9 +46,7 @@ def check(runs: list[Run]) -> Checks:
         )
         drags.setdefault(flow, {})[cells] = float(mean[2])
         curves[name] = (way, force[:, 2])
-        sound(run, checks)
     for flow, values in drags.items():
         if len(values) > 1:
             checks.study(f"drag coefficient {flow}", values, resolution="cells per edge")
     checks.figure("drag", "way / edge", "coefficient", curves)
-    return checks

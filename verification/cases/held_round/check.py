@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -81,9 +81,9 @@ def flow_of(run: Run) -> Flow:
     )
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Mean drag of the second half of each run, in a wide stream; lift of the long cylinder."""
-    checks, flows = Checks("round bodies at high Reynolds numbers"), [flow_of(run) for run in runs]
+    flows = [flow_of(run) for run in runs]
     drags: dict[str, dict[float, float]] = {}
     for flow in flows:
         name = f"{flow.name}, {flow.cells:g} cells"
@@ -113,9 +113,6 @@ def check(runs: list[Run]) -> Checks:
     long = {n: (f.way, f.force[:, 0]) for n, f in curves.items() if f.body == "cylinder"}
     if long:
         checks.figure("lift of the long cylinder", "way / D", "-", long)
-    for run in runs:
-        sound(run, checks)
-    return checks
 
 
 def compare_with_held(checks: Checks, flow: Flow, flows: list[Flow]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
@@ -21,9 +21,9 @@ def reference() -> dict[int, float]:
     return {int(row["reynolds"]): float(row["drag"]) for row in rows if row["tank"] == "box"}
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Mean drag of the last two diameters of way; in the long box moved against held."""
-    checks, known = Checks("sphere held in a stream"), reference()
+    known = reference()
     curves: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     drags: dict[int, dict[float, float]] = {}
     long: dict[str, float] = {}
@@ -54,11 +54,9 @@ def check(runs: list[Run]) -> Checks:
             f"{name}: lift over drag", float(np.hypot(mean[0], mean[1]) / mean[2]), 0.01, cells > 11
         )
         curves[name] = (way, force[:, 2])
-        sound(run, checks)
     for name, drag in long.items():
         if name != "held" and "held" in long:
             checks.close(f"in a long box, {name}: drag as held", drag, long["held"], APART)
     for reynolds, by_cells in sorted(drags.items()):
         checks.study(f"Re {reynolds}: drag", by_cells, known[reynolds], "cells per diameter")
     checks.figure("drag coefficient", "way / diameter", "-", curves)
-    return checks

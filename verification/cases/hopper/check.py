@@ -1,11 +1,8 @@
-"""Rock from a split hopper in a current: the books of momentum and volume, and where it lies.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Rock from a split hopper in a current: the books of momentum and volume, and where it lies."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.health import EXCESS_LIMIT
 from micstools.reading.reader import Run
 
@@ -39,17 +36,10 @@ def load(run: Run, checks: Checks) -> None:
     checks.true("downstream, on average", drift > 0.0, f"{drift:.2f} m")
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """One run."""
-    checks = Checks("hopper")
     for run in runs:
         momentum(run, checks)
         load(run, checks)
         excess = run.series.volume_excess_max.max()
         checks.below("largest excess of a cell [V]", excess, EXCESS_LIMIT)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,13 +1,10 @@
-"""A box and a sphere on an incline slide, roll or stand.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A box and a sphere on an incline slide, roll or stand."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Bodies, Run
 
 BAND = 0.01
@@ -23,9 +20,8 @@ def acceleration(b: Bodies, k: int) -> float:
     return float((b.velocity[j, k, 0] - b.velocity[i, k, 0]) / (b.time[j] - b.time[i]))
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Acceleration, or creep, of each."""
-    checks = Checks("incline")
     for run in runs:
         b = run.bodies
         g = np.array(run.value("fluid", "gravity"))
@@ -43,9 +39,3 @@ def check(runs: list[Run]) -> Checks:
             moved = float(np.linalg.norm(b.position[-1, 0] - b.position[0, 0]))
             checks.below(f"{name} way of the box in all [m]", moved, 1e-3)
         checks.close(f"{name} sphere [m/s2]", acceleration(b, 1), sphere, BAND)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

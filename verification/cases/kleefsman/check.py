@@ -1,20 +1,16 @@
-"""Pressure of a dam break on a box: arrival and plateau against an experiment.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Pressure of a dam break on a box: arrival and plateau against an experiment."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main
+from measures.checks import Checks
 from measures.impact_pressure import Experiment
 from micstools.reading.reader import Run
 
 FRONT = 2.3955  # of the box [m]
 
 BOX = Experiment(
-    title="dam break against a box",
     tables=str(Path(__file__).with_name("B7_kleefsman_{}.csv")),
     height=0.55,
     way=FRONT - 1.228,
@@ -35,16 +31,11 @@ def passes(run: Run, x: float, level: float) -> float:
     return float(np.interp(level, heights[i - 1 : i + 1], run.field_times[i - 1 : i + 1]))
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """The sensors, and for information when the water passed the gauges before the box."""
-    checks = BOX.check(runs)
+    BOX.check(runs, checks)
     gauges = np.loadtxt(Path(__file__).with_name("B7_kleefsman_gauges.csv"), delimiter=",")
     for run in runs:
         for x, level, time in gauges:
             label = f"{run.folder.name}: {1000 * level:g} mm of water at {x:g} m [s]"
             checks.close(label, passes(run, x, level), float(time), 0.04, counts=False)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

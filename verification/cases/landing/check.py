@@ -1,12 +1,9 @@
-"""Fluid that cells hold beyond their open volume when blocks land, in rows, restart file, frames.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Fluid beyond the open volume of cells when blocks land, in rows, restart file and frames."""
 
 import numpy as np
 
 from measures.balance import excess
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.health import EXCESS_LIMIT
 from micstools.reading.reader import Fields, Run
 
@@ -61,19 +58,12 @@ def rise_of(run: Run, name: str, checks: Checks) -> None:
     checks.close(f"{name}: rise of the level [m]", height - level, wanted, LEVEL_BAND)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Every run keeps its room; where all blocks are dropped the level tells their volume."""
-    checks = Checks("landing")
     for run in runs:
         name = run.folder.name
         excess_of(run, name, checks)
         if name.startswith(("case", "flat")):
             rise_of(run, name, checks)
-        sound(run, checks)
     curves = {run.folder.name: (run.series.time, run.series.volume_excess_max) for run in runs}
     checks.figure("largest excess of fluid in a cell", "t [s]", "V", curves)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

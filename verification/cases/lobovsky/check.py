@@ -1,15 +1,10 @@
-"""Pressure of a dam break on the far wall: arrival and plateau against an experiment.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Pressure of a dam break on the far wall: arrival and plateau against an experiment."""
 
 from pathlib import Path
 
-from measures.checks import main
 from measures.impact_pressure import Experiment
 
 WALL = Experiment(
-    title="dam break against a wall",
     tables=str(Path(__file__).with_name("B6_lobovsky_{}.csv")),
     height=0.3,
     way=1.61 - 0.6,
@@ -21,6 +16,3 @@ WALL = Experiment(
 )
 
 check = WALL.check
-
-if __name__ == "__main__":
-    main(check)

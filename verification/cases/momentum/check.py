@@ -3,16 +3,15 @@
 import numpy as np
 
 from measures.budget import Budget
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 BAND, DRAG_BAND = 1e-3, 0.01
 TOUCH_BAND = 1e-5
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Momentum without an owner over the impulse that moves the body; energy that is lost."""
-    checks = Checks("momentum and energy")
     curves = {}
     for run in runs:
         name, budget, b = run.folder.name, Budget(run), run.bodies
@@ -58,6 +57,4 @@ def check(runs: list[Run]) -> Checks:
         band = TOUCH_BAND if b.fixed.any() and not b.fixed.all() else BAND
         checks.below(f"{name}: momentum without an owner / {said}", worst, band)
         curves[name] = (budget.time[: last + 1], np.abs(error[: last + 1]).max(axis=1) / scale)
-        sound(run, checks)
     checks.figure("momentum without an owner / impulse", "t [s]", "-", curves)
-    return checks

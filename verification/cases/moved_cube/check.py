@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 BAND = 0.1  # of the weight of the cube
 G = 9.81
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Largest deviation of the force from its mean over a cell of way, after one edge of way."""
-    checks, curves = Checks("moved cube"), {}
+    curves = {}
     for run in runs:
         b, h = run.bodies, float(run.grid.spacing[2])
         cells = float(run.value("shape", "size")) / h
@@ -25,6 +25,4 @@ def check(runs: list[Run]) -> Checks:
         checks.below(f"{name}: largest noise of the force, in weights", noise, BAND)
         checks.below(f"{name}: its scatter", float((force - level)[late].std()), BAND, counts=False)
         curves[name] = (way / cells, force)
-        sound(run, checks)
     checks.figure("force", "way / edge", "weights", curves)
-    return checks

@@ -1,11 +1,8 @@
-"""Waves and currents leave through an outflow: what comes back, and the level they leave behind.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Waves and currents leave through an outflow: what comes back, and the level they leave behind."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -65,20 +62,13 @@ def uniform(run: Run, checks: Checks) -> None:
     checks.below("uniform current: change of velocity [m/s]", worst, 1e-6)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each kind of run."""
-    checks = Checks("outflow")
     named = {run.folder.name: run for run in runs}
     for name, run in named.items():
-        sound(run, checks)
         if name in REFLECTED and f"{name}_reference" in named:
             waves(run, named[f"{name}_reference"], checks)
     if "current" in named:
         current(named["current"], checks)
     if "uniform" in named:
         uniform(named["uniform"], checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,13 +1,10 @@
-"""Flow between plates and in ducts, driven by a body force along a periodic direction.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Flow between plates and in ducts, driven by a body force along a periodic direction."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.profiles import cubic, table, with_ends
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
@@ -75,20 +72,13 @@ def duct(run: Run, checks: Checks) -> None:
             )
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Plane runs and ducts."""
-    checks = Checks("Poiseuille flow")
     errors: dict[float, float] = {}
     check_series(checks)
     for run in runs:
-        sound(run, checks)
         if run.folder.name.startswith("duct"):
             duct(run, checks)
         else:
             errors[run.grid.z.size - 1] = plane(run, checks)
     checks.study("plane: error of the steady profile", errors, 0.0)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

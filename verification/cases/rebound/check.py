@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
@@ -53,14 +53,12 @@ def approach(checks: Checks, runs: list[Run]) -> None:
         checks.below(f"{about}, mean error", abs(float(errors.mean())), MEAN_BAND, film)
         curves[said] = (gap[5:] / cell, factor[5:])
         wanted["Brenner (1961)"] = (gap[5:] / cell, exact[5:])
-        sound(run, checks)
     if curves:
         checks.figure("moved to the floor", "gap / cell", "- / Stokes", curves, wanted, smooth=True)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Speed before the wall, height of the first rebound."""
-    checks = Checks("rebound in oil")
     approach(checks, [run for run in runs if run.folder.name.startswith("approach")])
     falls = [run for run in runs if not run.folder.name.startswith("approach")]
     for name, impact in IMPACT.items():
@@ -90,8 +88,6 @@ def check(runs: list[Run]) -> Checks:
             if film:
                 heights[cells] = 1e3 * height
             curves[said] = (b.time - b.time[struck], 1e3 * gap)
-            sound(run, checks)
         if curves:
             checks.study(f"{name}: height [mm]", heights, 1e3 * top, "cells per diameter")
             checks.figure(name, "t [s]", "gap [mm]", curves, {"measured": (times, 1e3 * gaps)})
-    return checks

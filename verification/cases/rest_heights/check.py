@@ -1,11 +1,8 @@
-"""A hexapod on one, two and three legs stands as high as its shape says.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A hexapod on one, two and three legs stands as high as its shape says."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -28,9 +25,8 @@ def tilt(q: Array, legs: tuple[float, float, float]) -> float:
     return float(np.degrees(2.0 * np.arcsin(min(1.0, np.linalg.norm(ours - ideal) / 2.0))))
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Height, tilt and speed at the end."""
-    checks = Checks("rest heights of a hexapod")
     for run in runs:
         b, name = run.bodies, run.folder.name
         counts = run.value("contact", "model") == "surface"
@@ -41,9 +37,3 @@ def check(runs: list[Run]) -> Checks:
             checks.below(f"{on} tilt [deg]", tilt(b.quaternion[-1, k], legs), TILT, counts)
             speed = float(np.linalg.norm(b.velocity[-1, k]))
             checks.below(f"{on} speed at the end [m/s]", speed, REST, counts)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

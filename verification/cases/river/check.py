@@ -1,11 +1,8 @@
-"""A current with and without blocks: a steady surface, and blocks that come to rest.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A current with and without blocks: a steady surface, and blocks that come to rest."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 LEVEL_BAND = 1e-3  # of the depth
@@ -48,14 +45,7 @@ def blocks(run: Run, checks: Checks) -> None:
     )
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Both runs."""
-    checks = Checks("river")
     for run in runs:
-        sound(run, checks)
         {"empty": empty, "blocks": blocks}[run.folder.name](run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 QUICK = ("dolos_lab_06",)
@@ -19,9 +19,9 @@ QUARTERS = 4  # of the second half of a run, whose means tell the scatter
 G = 9.81
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Mean speed over the second half of each run, and the drag coefficient that belongs to it."""
-    checks, curves = Checks("settling units"), {}
+    curves = {}
     speeds: dict[str, dict[float, float]] = {}
     for run in runs:
         b, unit, width = run.bodies, run.shapes["unit"], run.grid.high - run.grid.low
@@ -49,7 +49,6 @@ def check(runs: list[Run]) -> Checks:
         scatter = float(np.std(means)) / mean
         checks.below(f"{name}: scatter of partial means", scatter, 0.05, counts=False)
         curves[name] = (b.time * mean / height, speed / mean)
-        sound(run, checks)
     for flow, found in speeds.items():
         for cells in found:
             if 2 * cells in found:
@@ -58,4 +57,3 @@ def check(runs: list[Run]) -> Checks:
         if len(found) > 1:
             checks.study(f"{flow}: speed [m/s]", found, resolution="cells along the unit")
     checks.figure("speed over its mean", "way / height", "-", curves)
-    return checks

@@ -1,13 +1,10 @@
-"""A sphere thrown along the floor slips, then rolls with 5/7 of its speed.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A sphere thrown along the floor slips, then rolls with 5/7 of its speed."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 BAND = 0.01
@@ -15,9 +12,8 @@ VARIES = ("contact wall_friction",)
 ROWS = np.loadtxt(Path(__file__).with_name("D4.csv"), delimiter=",", skiprows=2)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """When slipping ends, where, and the speed from then on."""
-    checks = Checks("sphere from slipping to rolling")
     for run in runs:
         b = run.bodies
         radius = 0.02
@@ -39,9 +35,3 @@ def check(runs: list[Run]) -> Checks:
         t = np.array([0.0, t_roll, b.time[-1]])
         ideal = (t, np.array([v0, v_roll, v_roll]))
         checks.figure(name, "t [s]", "m/s", {"mics": (b.time, speed)}, {"exact": ideal}, True)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

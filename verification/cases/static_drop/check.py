@@ -1,11 +1,8 @@
-"""A drop without gravity stays at rest, with the pressure jump of Young and Laplace.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A drop without gravity stays at rest, with the pressure jump of Young and Laplace."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 VARIES = ("numerics divergence_tolerance",)
@@ -14,9 +11,8 @@ JUMP_BAND = 0.01
 SHAPES = {"plane": (0.004, 1), "space": (0.007, 2)}  # radius [m], curvature times radius
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Largest velocity and pressure jump in the final state."""
-    checks = Checks("static drop")
     for run in runs:
         name = run.folder.name
         radius, main_curvatures = SHAPES[name]
@@ -31,9 +27,3 @@ def check(runs: list[Run]) -> Checks:
         checks.close(f"{name}: pressure jump [Pa]", jump, exact, JUMP_BAND)
         fallen = f"{run.series.curvature_fallback[-1]:.0f}"
         checks.true(f"{name}: cells without heights at the end", True, fallen, counts=False)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

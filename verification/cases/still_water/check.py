@@ -1,12 +1,9 @@
-"""Still water stays still, and its pressure carries the displaced weight.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Still water stays still, and its pressure carries the displaced weight."""
 
 import numpy as np
 
 from measures.buoyancy import buoyancy_rows
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 VARIES = (  # every way to compute keeps still water still
@@ -40,9 +37,8 @@ def counted_rows(run: Run, checks: Checks) -> None:
         checks.close(name, force, weight * float(solid[mine].sum()), 1e-6)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Speeds at all written times and in the final state; forces on the blocks at the end."""
-    checks = Checks("still water")
     for run in runs:
         tolerance = float(run.value("numerics", "divergence_tolerance"))
         written = max(float(np.abs(run.fields_at(t).velocity).max()) for t in run.field_times)
@@ -54,9 +50,3 @@ def check(runs: list[Run]) -> Checks:
             counted_rows(run, checks)
         else:
             buoyancy_rows(run, checks)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,13 +1,10 @@
-"""Decay of Taylor-Green vortices: order of accuracy, amplitude and kinetic energy.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Decay of Taylor-Green vortices: order of accuracy, amplitude and kinetic energy."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.profiles import table
 from micstools.reading.reader import Run
 
@@ -44,12 +41,10 @@ def compare(run: Run) -> tuple[float, float, float]:
     return float(error), float(amplitude), float(0.5 * (u**2 + w**2).mean())
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Errors over the grids, and bands on one of them."""
-    checks = Checks("Taylor-Green vortices")
     errors: dict[str, dict[float, float]] = {kind: {} for kind in LABEL}
     for run in runs:
-        sound(run, checks)
         kind, cells = run.folder.name.split("_")[0], run.grid.x.size - 1
         errors[kind][cells], amplitude, energy = compare(run)
         wanted = reference(round(float(run.series.time[-1]), 9))
@@ -79,8 +74,3 @@ def check(runs: list[Run]) -> Checks:
             counts=kind != "courant",
         )
         checks.study(f"error of the velocity, {label}", found, 0.0)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
@@ -66,9 +66,8 @@ def exact_start(run: Run, end: float) -> tuple:
     return root**2, way, speed
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Largest speed and the whole curve; errors over resolution."""
-    checks = Checks("settling sphere of ten Cate")
     for reference in rows("cases.csv"):
         case, peak = reference["case"], float(reference["umax_exp_m_s"])
         density = float(reference["rho_f"])
@@ -111,7 +110,6 @@ def check(runs: list[Run]) -> Checks:
             heights[f"{cells:g} cells"] = (gap[falling] / diameter, speed[falling])
             sideways = float(np.abs(b.velocity[:, 0, :2]).max()) / peak
             checks.below(f"{name}: sideways speed / peak", sideways, 1e-3, counts=gated)
-            sound(run, checks)
         if not mine:
             continue
         soon = way < START * diameter
@@ -140,4 +138,3 @@ def check(runs: list[Run]) -> Checks:
         if case == "E1":
             shown["read a second time"] = measured("E1_velocity_second_digitisation.csv")
         checks.figure(f"case {case}", "t [s]", "downward speed [m/s]", curves, shown)
-    return checks

@@ -1,11 +1,8 @@
-"""Tetrapods of 2 m that fall on a slope in the sea: fall, rest, place and soundness at that scale.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Tetrapods of 2 m that fall on a slope in the sea: fall, rest and place at that scale."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.energy import made_by_contact
 from micstools.reading.health import EXCESS_LIMIT
 from micstools.reading.reader import Run
@@ -52,15 +49,8 @@ def computation(run: Run, checks: Checks) -> None:
     checks.below("largest excess of a cell [V]", run.series.volume_excess_max.max(), EXCESS_LIMIT)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """One run."""
-    checks = Checks("tetrapods")
     for run in runs:
         blocks(run, checks)
         computation(run, checks)
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,18 +1,14 @@
-"""Each of two parted basins keeps its own liquid while a block falls into one.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""Each of two parted basins keeps its own liquid while a block falls into one."""
 
 import numpy as np
 
 from measures.balance import liquid_between
-from measures.checks import DRIFT_BAND, Checks, main, sound
+from measures.checks import DRIFT_BAND, Checks
 from micstools.reading.reader import Run
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Liquid of each basin in every restart file against the volume of the start."""
-    checks = Checks("two basins")
     for run in runs:
         level = float(run.value("fluid", "water_level"))
         width = run.grid.high[1] - run.grid.low[1]
@@ -33,9 +29,3 @@ def check(runs: list[Run]) -> Checks:
                 checks.below(f"drift of the {basin} basin in {name}", drift, DRIFT_BAND)
         lowest = float(run.bodies.position[-1, 1, 2])
         checks.true("the block is under water in the end", lowest < 0.5 * level, f"{lowest:.4f} m")
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

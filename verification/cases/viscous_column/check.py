@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -67,9 +67,9 @@ def collapse(run: Run) -> Collapse:
     return Collapse(name, step, s.time, s.kinetic_energy_fluid, free, 1.0)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Each run against its bound, and each pair of runs against each other."""
-    checks, pairs = Checks("viscous columns"), {}
+    pairs = {}
     for run in runs:
         found = collapse(run)
         counts = not any(found.name.endswith(word) for word in ("c_ismac", "mics"))
@@ -79,7 +79,6 @@ def check(runs: list[Run]) -> Checks:
             left = float(found.kinetic[-1] / found.largest)
             checks.below(f"{said}: left of it after {found.time[-1]:g} s", left, LATE_LIMIT, counts)
         pairs.setdefault(found.name, {})[found.step] = found
-        sound(run, checks)
     for name, pair in pairs.items():
         if len(pair) == 2:
             whole, tenth = pair["whole"].largest, pair["tenth"].largest
@@ -93,7 +92,6 @@ def check(runs: list[Run]) -> Checks:
         {name: shown(pair["tenth"]) for name, pair in drawn.items() if "tenth" in pair},
         smooth=True,
     )
-    return checks
 
 
 def shown(found: Collapse) -> tuple[Array, Array]:

@@ -1,13 +1,10 @@
-"""A small gravity wave on a viscous liquid against the exact solution.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A small gravity wave on a viscous liquid against the exact solution."""
 
 from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from measures.waves import standing_amplitude
 from micstools.reading.reader import Run
 
@@ -18,9 +15,9 @@ AMPLITUDE = 0.01  # [m]
 TABLE = Path(__file__).with_name("B2_prosperetti_single_fluid.csv")
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Root mean square of the difference in amplitude at the times of the table."""
-    checks, errors, ours = Checks("viscous wave"), {}, {}
+    errors, ours = {}, {}
     rows = [line for line in TABLE.read_text().splitlines() if line[0] not in "#t"]
     table = np.array([[float(part) for part in row.split(",")] for row in rows])
     for run in runs:
@@ -32,11 +29,5 @@ def check(runs: list[Run]) -> Checks:
         label = f"{name}: rms difference, {cells} cells per wavelength"
         checks.below(label, errors[cells], RMS_BAND, counts=cells >= COUNTS_FROM)
         ours[name] = (time, amplitude / AMPLITUDE)
-        sound(run, checks)
     checks.study("rms difference in amplitude", errors, 0.0, "cells per wavelength")
     checks.figure("amplitude", "t [s]", "a/a0", ours, {"exact": (table[:, 0], table[:, 1])})
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,19 +1,15 @@
-"""A water ball in a uniform stream keeps the velocity of the stream.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A water ball in a uniform stream keeps the velocity of the stream."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 BAND = 1e-10  # of the speed of the stream
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Velocity of cells and faces in the final state against that of the start."""
-    checks = Checks("water ball in a uniform stream")
     for run in runs:
         stream = np.array(run.value("fluid", "velocity"), float)
         speed = float(np.linalg.norm(stream))
@@ -27,9 +23,3 @@ def check(runs: list[Run]) -> Checks:
         checks.true(
             "water and air are still there", bool(liquid.max() > 0.99 and liquid.min() < 0.01)
         )
-        sound(run, checks)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

@@ -1,11 +1,8 @@
-"""A wave without viscosity keeps its height, wherever its level lies in a cell.
-
-usage: python check.py RUN [RUN ...]
-"""
+"""A wave without viscosity keeps its height, wherever its level lies in a cell."""
 
 import numpy as np
 
-from measures.checks import Checks, main, sound
+from measures.checks import Checks
 from measures.waves import period, standing_amplitude
 from micstools.reading.reader import Run
 
@@ -23,9 +20,9 @@ def exact_period(depth: float) -> float:
     return float(2.0 * np.pi / squared**0.5)
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Largest height in the last half second over that of the start."""
-    checks, ours = Checks("waves without viscosity"), {}
+    ours = {}
     for run in runs:
         name = run.folder.name
         time, amplitude = standing_amplitude(run, mode=4)
@@ -35,10 +32,4 @@ def check(runs: list[Run]) -> Checks:
         exact = exact_period(depth)
         checks.close(f"{name}: period [s]", period(time, amplitude), exact, 0.05, counts=False)
         ours[name] = (time, amplitude / HEIGHT)
-        sound(run, checks)
     checks.figure("height", "t [s]", "a/a0", ours)
-    return checks
-
-
-if __name__ == "__main__":
-    main(check)

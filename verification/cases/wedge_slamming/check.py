@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from measures.checks import Checks, sound
+from measures.checks import Checks
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
@@ -20,9 +20,9 @@ def similarity() -> dict[int, float]:
     return {round(float(row["deadrise_deg"])): float(row["F_over_rhoV3t"]) for row in rows}
 
 
-def check(runs: list[Run]) -> Checks:
+def check(runs: list[Run], checks: Checks) -> None:
     """Mean force coefficient over the second half of the entry."""
-    checks, exact = Checks("wedge slamming"), similarity()
+    exact = similarity()
     studies: dict[int, dict[float, float]] = {}
     curves, wanted = {}, {}
     for run in runs:
@@ -47,9 +47,7 @@ def check(runs: list[Run]) -> Checks:
         wet = depth > 0.1 * depth[-1]
         curves[name] = (1e3 * depth[wet], force[wet] / unit[wet])
         wanted[f"similarity, {angle} deg"] = (1e3 * depth[[0, -1]].clip(0), [exact[angle]] * 2)
-        sound(run, checks)
     for angle, values in studies.items():
         title = f"deadrise {angle} deg: F/(rho V^3 t)"
         checks.study(title, values, exact[angle], "cells per final depth")
     checks.figure("force", "depth of the tip [mm]", "F/(rho V^3 t)", curves, wanted, smooth=True)
-    return checks
