@@ -182,12 +182,10 @@ mutate:
 	@$(deps) test shape ensemble survey serve
 	@$(PYTHON) verification/mutate.py
 
-# Every script of the folder, though one finds a fault.
 soak:
 	@$(deps) test
 	@for build in '' MPI=1 DEBUG=1 SAN=1; do $(MAKE) --no-print-directory $$build || exit 1; done
-	@status=0; for script in verification/soak/*.py; do \
-	  echo "$$script"; $(PYTHON) $$script || status=1; done; exit $$status
+	@$(PYTHON) verification/run_soak.py
 
 bench: deps
 	@$(MAKE) --no-print-directory all

@@ -129,7 +129,6 @@ def test_a_variable_is_taken_out() -> None:
         "&drop a = 1, 2,\n  3  ! of a\n  b = 'c = 4 / !', c = 5  ! kept\n  d = 6 /\n&drop c = 7 /\n"
     )
 
-
     def without(name: str, n: int = 0) -> str:
         return settings.set_group(text, "drop", {name: None}, n)
 

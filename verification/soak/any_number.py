@@ -1,33 +1,24 @@
 """Whole jobs on any number of processes and threads: the same bits, a stop and a restart included.
 
-usage: python verification/soak/any_number.py [CASE ...] [--on RxT ...] [--stops N]
-
-Each case (the main job and the river) runs whole with ./mics on one thread, then with ./mics_mpi
-on R processes of T threads (1 to 4 of 1 and 2). N times it is stopped on one number while a free
-block touches another one, the floor or the bed, and goes on on another number. All datasets must
-have the same bits, except those that name the machine or the clock.
+Each case (words; by default the main job and the river) runs whole with ./mics on one thread, then
+with ./mics_mpi on 1 to 4 processes of 1 and 2 threads. Twice it is stopped on one number while a
+free block touches another one, the floor or the bed, and goes on on another number. All datasets
+must have the same bits, except those that name the machine or the clock.
 """
 
-import argparse
-import os
 import signal
-import subprocess
-import sys
-import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "verification"))
+from run_cases import ROOT, Machine
+from run_soak import Given
+from soak.shop import Shop, column, restart_files, start
 
-from run_cases import MPI_SETTINGS, Machine  # noqa: E402
-from same_bits import differences  # noqa: E402
-
-ALONE = Machine(ROOT / "mics", threads=1)
-DEFAULT = [f"{ranks}x{threads}" for ranks in (1, 2, 3, 4) for threads in (1, 2)]
+NUMBERS = [f"{ranks}x{threads}" for ranks in (1, 2, 3, 4) for threads in (1, 2)]
 ROUNDED = 5.1e-5  # s, of a time that is told with four digits
 MOVING = 1.0e-2  # m/s of a block that touches something: in the middle of a contact
 SMALL = """! A block is thrown onto the floor of a shallow tank; a second.
@@ -46,18 +37,6 @@ def machine(text: str) -> Machine:
     return Machine(ROOT / "mics_mpi", ranks, threads)
 
 
-def start(on: Machine, *words: str) -> subprocess.Popen[str]:
-    """Begin a run."""
-    return subprocess.Popen(
-        [*on.command, *words],
-        env={**os.environ, **MPI_SETTINGS, **on.patience},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 def contact_times(folder: Path) -> np.ndarray:
     """Times of rows in which a free block touches something and moves."""
     with h5py.File(folder / "run.h5", "r", locking=False) as h5:
@@ -68,88 +47,46 @@ def contact_times(folder: Path) -> np.ndarray:
         return np.asarray(bodies["time"][:][touching.any(axis=1)])
 
 
-def last_time(folder: Path) -> float:
-    """Time of the last row of a growing file."""
-    try:
-        with h5py.File(folder / "run.h5", "r", locking=False) as h5:
-            return float(h5["series/time"][-1])
-    except (OSError, KeyError, RuntimeError, IndexError):
-        return -1.0
-
-
-def stopped(case: Path, on: Machine, then: Machine, until: float, folder: Path) -> str:
-    """Stop a run at about `until` and go on; where it stopped, or what went wrong."""
-    run = start(on, "--output", str(folder), str(case))
-    while last_time(folder) < until and run.poll() is None:
+def stopped(
+    shop: Shop, on: Machine, then: Machine, until: float, folder: Path
+) -> tuple[float, str]:
+    """Stop a run at about `until` and go on: where it stopped, and what went wrong."""
+    run, at = start(on, "--output", folder, shop.case), -1.0
+    while at < until and run.poll() is None:
         time.sleep(0.01)
+        at = max([-1.0, *column(folder, "series/time")[-1:]])
     if run.poll() is None:
         run.send_signal(signal.SIGUSR1)  # mpirun hands it on and kills nobody
-    said = run.communicate()[1]
+    run.communicate()
     if run.returncode == 0:
-        return "it was done before it was stopped"
-    at = last_time(folder)
-    newest = max(folder.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
-    again = start(then, "--restart", str(newest), str(case))
+        return np.nan, "it was done before it was stopped"
+    at = float(column(folder, "series/time")[-1])
+    again = start(then, "--restart", restart_files(folder)[-1], shop.case)
     said = again.communicate()[1]
-    return f"stopped at {at:.4f} s" if again.returncode == 0 else said
+    return at, said if again.returncode else ""
 
 
-def compare(whole: Path, folder: Path) -> list[str]:
-    """What differs, restart files of other times apart."""
-    return [line for line in differences(whole, folder) if not line.startswith("restart-")]
-
-
-def tell(name: str, what: str, found: list[str], began: float) -> int:
-    """Print a line; 1 if something was found."""
-    verdict = "FAILS" if found else "holds"
-    print(f"{name} {what}: {verdict}, {time.monotonic() - began:.0f} s", flush=True)
-    print("".join(f"    {line}\n" for line in found), end="", flush=True)
-    return int(bool(found))
-
-
-def try_case(case: Path, numbers: list[str], stops: int, work: Path) -> int:
-    """How much of a case does not hold."""
-    whole, failed, began = work / "whole", 0, time.monotonic()
-    said = start(ALONE, "--output", str(whole), str(case)).communicate()[1]
-    print(f"{case.name} alone: {time.monotonic() - began:.0f} s {said}", flush=True)
+def try_case(
+    case: Path, numbers: list[str], stops: int, work: Path
+) -> Iterator[tuple[str, list[str]]]:
+    """The case on each number, then stopped and gone on with."""
+    shop = Shop(Machine(ROOT / "mics", threads=1), case, work / "whole")
+    shop.run("--output", shop.whole)
     for text in numbers:
-        began, folder = time.monotonic(), work / text
-        start(machine(text), "--output", str(folder), str(case)).communicate()
-        failed += tell(case.name, text, compare(whole, folder), began)
-    times = contact_times(whole)
+        start(machine(text), "--output", work / text, case).communicate()
+        yield f"{case.name} {text}", shop.unlike(work / text)
+    times = contact_times(shop.whole)
     for i in range(stops):
-        began, folder = time.monotonic(), work / f"stop-{i}"
         on, then = numbers[-1 - i % len(numbers)], numbers[i % len(numbers)]
-        until = float(times[(i + 1) * len(times) // (stops + 1)])
-        said = stopped(case, machine(on), machine(then), until, folder)
-        near = np.abs(times - last_stop(said)) < ROUNDED
-        touch = " in a contact" if near.any() else ""
-        failed += tell(
-            case.name, f"{on}, {said}{touch}, then {then}", compare(whole, folder), began
-        )
-    return failed
+        until, folder = float(times[(i + 1) * len(times) // (stops + 1)]), work / f"stop-{i}"
+        at, wrong = stopped(shop, machine(on), machine(then), until, folder)
+        touch = " in a contact" if (np.abs(times - at) < ROUNDED).any() else ""
+        found = [wrong] if wrong else shop.unlike(folder)
+        yield f"{case.name} {on}, stopped at {at:.4f} s{touch}, then {then}", found
 
 
-def last_stop(said: str) -> float:
-    """The time that `stopped` told; none if it told something else."""
-    words = said.split()
-    return float(words[2]) if words[:2] == ["stopped", "at"] else float("nan")
-
-
-def main() -> int:
-    """Command line; 1 if anything differed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    inputs = [ROOT / "input" / "blocks.nml", ROOT / "input" / "river.nml"]
-    parser.add_argument("cases", type=Path, nargs="*", default=inputs, metavar="CASE")
-    parser.add_argument("--on", nargs="+", default=DEFAULT, metavar="RxT")
-    parser.add_argument("--stops", type=int, default=2)
-    chosen = parser.parse_args()
-    failed = 0
-    for case in chosen.cases:
-        with tempfile.TemporaryDirectory() as folder:
-            failed += try_case(case, chosen.on, chosen.stops, Path(folder))
-    return int(failed > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """Every case."""
+    usual = [ROOT / "input" / "blocks.nml", ROOT / "input" / "river.nml"]
+    for i, case in enumerate(map(Path, given.words) if given.words else usual):
+        yield from try_case(case.resolve(), NUMBERS, given.n or 2, work / str(i))

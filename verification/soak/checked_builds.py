@@ -1,30 +1,25 @@
 """Short runs with every check there is: run-time checks, sanitizers, valgrind.
 
-usage: python verification/soak/checked_builds.py [NAME ...] [--cells N] [--how debug|san|valgrind]
-
-Every case of `input` and `verification/cases` (or those whose folder or file is named) with at most
-N cells makes a few steps with ./mics_debug (made by `make DEBUG=1`: bounds, unset and overflowing
-numbers), ./mics_san (`make SAN=1`: address and undefined behaviour) and, if it is small, with
-./mics_debug under valgrind (uninitialised memory), and is continued from its restart file. Each
-must end with code 0 and no word on standard error but the program's own.
+Every case of `input` and `verification/cases` (or those whose folder or file is named: words) makes
+a few steps with ./mics_debug (made by `make DEBUG=1`: bounds, unset and overflowing numbers),
+./mics_san (`make SAN=1`: address and undefined behaviour) and, if it is small, with ./mics_debug
+under valgrind (uninitialised memory), and is continued from its restart file. Each must end with
+code 0 and no word on standard error but the program's own.
 """
 
-import argparse
 import os
 import shutil
 import subprocess
-import sys
-import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import f90nml
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "verification"))
-
-from run_cases import CASES, changed, prepare  # noqa: E402
+from run_cases import CASES, ROOT, changed, prepare
+from run_soak import Given
+from soak.shop import restart_files
 
 STEPS = 3
 SETTINGS = {
@@ -86,21 +81,15 @@ def run(check: Check, words: list[str], work: Path) -> str:
     return ""
 
 
-def try_case(check: Check, name: str, text: str, work: Path) -> str:
+def try_case(check: Check, text: str, work: Path) -> str:
     """What is wrong with some steps of a case and a restart; empty if nothing is."""
-    short, longer, cells = shortened(text)
-    if cells > check.cells:
-        return ""
+    short, longer, _ = shortened(text)
     (work / "short.nml").write_text(short)
     (work / "longer.nml").write_text(longer)
     shutil.rmtree(work / "out", ignore_errors=True)
-    began = time.monotonic()
-    found = run(check, ["--output", "out", "short.nml"], work)
-    newest = sorted((work / "out").glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
+    found, newest = run(check, ["--output", "out", "short.nml"], work), restart_files(work / "out")
     if not found and newest:
         found = run(check, ["--restart", str(newest[-1]), "longer.nml"], work)
-    verdict = "FAILS" if found else "holds"
-    print(f"{check.name:9}{verdict} {name} {time.monotonic() - began:.1f} s", flush=True)
     return found
 
 
@@ -121,35 +110,16 @@ def cases(work: Path) -> list[tuple[str, Path]]:
     return found
 
 
-def main() -> int:
-    """Print a line per case and check; 1 if any failed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all cases")
-    parser.add_argument("--how", choices=[check.name for check in CHECKS], action="append")
-    parser.add_argument("--cells", type=int, default=100_000, help="leave out larger cases")
-    chosen = parser.parse_args()
-    failed, ran = 0, 0
-    with tempfile.TemporaryDirectory() as folder:
-        for name, path in cases(Path(folder)):
-            if chosen.names and not any(name.startswith(each) for each in chosen.names):
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """Every case in every way that its size allows."""
+    for name, path in cases(work):
+        if given.words and not name.startswith(given.words):
+            continue
+        text = path.read_text()
+        for check in CHECKS:
+            if shortened(text)[2] > check.cells:
                 continue
-            text = path.read_text()
-            if shortened(text)[2] > chosen.cells:
-                continue
-            for check in CHECKS:
-                if chosen.how and check.name not in chosen.how:
-                    continue
-                if not check.there:
-                    print(f"{check.name}: {' '.join(check.command)} is not there")
-                    failed += 1
-                    continue
-                found = try_case(check, name, text, path.parent)
-                ran += 1
-                failed += bool(found)
-                print(f"    {found}\n" if found else "", end="", flush=True)
-    print(f"{failed} of {ran} fail")
-    return int(failed > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+            began, missing = time.monotonic(), f"{' '.join(check.command)} is not there"
+            found = try_case(check, text, path.parent) if check.there else missing
+            said = f"{check.name:9} {name} {time.monotonic() - began:.1f} s"
+            yield said, [found] if found else []

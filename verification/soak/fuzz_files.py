@@ -1,35 +1,32 @@
 """Damaged input files: each must be refused with a message, or taken, soon and in little memory.
 
-usage: python verification/soak/fuzz_files.py [KIND ...] [--count N] [--seed S]
-                                              [--program ./mics_san] [--keep DIR]
-
 Every file starts as a good one of its kind and is damaged one to three times: 10,000 cases, 3,000
 files of each other kind. The program reads it with --check; where it takes the file, it also makes
 a few steps with it. A failure is an end by a signal, an exit code that is none of the program's, a
 message that is not its own, 20 s, or 4 GB. The last two hold for a single file of at most a few kB.
 
-The exit code is 0 when nothing failed; the files that failed are kept. The program is ./mics_san,
-which finds most, if `make SAN=1` has made it, else ./mics.
+Files that failed are kept in build/fuzz. The program is ./mics_san, which finds most, if `make
+SAN=1` has made it, else ./mics. Words: kinds.
 """
 
-import argparse
 import os
 import random
 import re
 import resource
 import struct
 import subprocess
-import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+from run_cases import ROOT
+from run_soak import Given
+
 SAN = ROOT / "mics_san"
 SECONDS = 20.0
 MEMORY = 4 << 30  # bytes
@@ -420,44 +417,21 @@ def try_file(kind: Kind, data: bytes, program: Path) -> tuple[int, str]:
     return code, fault
 
 
-def fuzz(kind: Kind, numbers: range, seed: int, program: Path, keep: Path) -> Counter[str]:
-    """Try damaged files; how they ended. Files that fail are kept and reported."""
-    ends: Counter[str] = Counter()
-    for i in numbers:
-        data = damaged(kind, random.Random(f"{kind.name} {seed} {i}"))
-        code, fault = try_file(kind, data, program)
-        how = {TAKEN: "taken", REFUSED: "refused", FILES: "unreadable"}
-        ends["failed" if fault else how[code]] += 1
-        if fault:
-            keep.mkdir(parents=True, exist_ok=True)
-            (keep / f"{kind.name}-{seed}-{i}").write_bytes(data)
-            print(f"{kind.name} {seed} {i}: {fault}", flush=True)
-    return ends
-
-
-def main() -> int:
-    """Command line; 1 if any file failed."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)}")
-    parser.add_argument("--count", type=int, help="files of each kind")
-    parser.add_argument("--first", type=int, default=0, help="number of the first one")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--program", type=Path, default=SAN if SAN.exists() else ROOT / "mics")
-    parser.add_argument("--keep", type=Path, default=ROOT / "build" / "fuzz")
-    chosen = parser.parse_args()
-    failed = 0
-    for name in chosen.kinds or KINDS:
-        ends = fuzz(
-            KINDS[name],
-            range(chosen.first, chosen.first + (chosen.count or KINDS[name].count)),
-            chosen.seed,
-            chosen.program.resolve(),
-            chosen.keep,
-        )
-        failed += ends["failed"]
-        print(name, dict(sorted(ends.items())), flush=True)
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """A line for each kind: how its files ended."""
+    program, keep = (
+        given.program or (SAN if SAN.exists() else ROOT / "mics"),
+        ROOT / "build" / "fuzz",
+    )
+    for name in given.words or KINDS:
+        kind, ends, faults = KINDS[name], Counter[str](), []
+        for i in range(given.n or kind.count):
+            data = damaged(kind, random.Random(f"{name} {given.seed} {i}"))
+            code, fault = try_file(kind, data, program.resolve())
+            how = {TAKEN: "taken", REFUSED: "refused", FILES: "unreadable"}
+            ends["failed" if fault else how[code]] += 1
+            if fault:
+                keep.mkdir(parents=True, exist_ok=True)
+                (keep / f"{name}-{given.seed}-{i}").write_bytes(data)
+                faults.append(f"{given.seed} {i}: {fault}")
+        yield f"{name} {dict(sorted(ends.items()))}", faults

@@ -1,20 +1,18 @@
 """Memory of a long run: what a small tank with blocks takes must not grow with its steps.
 
-usage: python verification/soak/memory.py [STEPS] [--program ./mics]
-
-A run of STEPS steps, with a row and a restart file after each, is compared with one of a twentieth
+A run of 10,000 steps, with a row and a restart file after each, is compared with one of a twentieth
 of them: it may have up to ALLOWANCE more at its peak, and no more. (Frames fill the cache of HDF5,
 which is bounded: a run of 10,000 frames has 13 MB more than one of 500, one of 20,000 no more.)
 """
 
-import argparse
 import os
-import subprocess
-import sys
-import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from run_cases import Machine
+from run_soak import Given
+from soak.shop import start
+
 ALLOWANCE = 1.0e6  # bytes; before the first leak was mended 1,000 steps took 29 MB
 DT = 1.0e-4
 
@@ -31,12 +29,11 @@ CASE = """&run
 """
 
 
-def peak(program: Path, steps: int, work: Path) -> int:
+def peak(machine: Machine, steps: int, work: Path) -> int:
     """Most memory that a run of so many steps had at once [bytes]."""
     case = work / f"{steps}.nml"
     case.write_text(CASE.format(t_end=steps * DT, dt=DT))
-    command = [program, "--quiet", "--threads", "1", "--output", work / f"run-{steps}", case]
-    process = subprocess.Popen([str(word) for word in command])
+    process = start(machine, "--output", work / f"run-{steps}", case)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode != 0:
@@ -44,26 +41,15 @@ def peak(program: Path, steps: int, work: Path) -> int:
     return 1024 * usage.ru_maxrss
 
 
-def growth(program: Path, steps: int, work: Path) -> tuple[str, list[str]]:
+def growth(machine: Machine, steps: int, work: Path) -> tuple[str, list[str]]:
     """What was measured, and what does not hold."""
     few = steps // 20
-    before, after = peak(program, few, work), peak(program, steps, work)
+    before, after = peak(machine, few, work), peak(machine, steps, work)
     said = f"{few} steps: {before / 1e6:.2f} MB, {steps} steps: {after / 1e6:.2f} MB at most"
     more = after - before
     return said, [f"{more / 1e6:.2f} MB more"] if more > ALLOWANCE else []
 
 
-def main() -> int:
-    """Command line; 1 if memory grows."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("steps", type=int, nargs="?", default=10000)
-    parser.add_argument("--program", type=Path, default=ROOT / "mics")
-    chosen = parser.parse_args()
-    with tempfile.TemporaryDirectory() as work:
-        said, found = growth(chosen.program.resolve(), chosen.steps, Path(work))
-    print(said, *found)
-    return 1 if found else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """The one pair of runs."""
+    yield growth(given.machine(), given.n or 10000, work)

@@ -1,31 +1,24 @@
 """Folders that are moved away from a running program: it ends, and no other run loses anything.
 
-usage: python verification/soak/moved_folders.py [N] [--ranks R] [--program ./mics] [--seed S]
-
-N times, at a random moment, the result folder of a run is moved and a second run begun in its
+100 times, at a random moment, the result folder of a run is moved and a second run begun in its
 place, deleted, or replaced by an empty one; or a second run on a node that does not see the lock of
 the first begins in the folder, or goes on in it. The first must end with code 4 and one line, or
 have been done; what it wrote stays as it was; the second must end like an undisturbed run.
 """
 
-import argparse
 import os
 import random
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "verification"))
-
-from run_cases import MPI_SETTINGS, Machine  # noqa: E402
-from same_bits import LOCK, contents, differences  # noqa: E402
-from soak.full_disk import RESULTS, Workshop, open_shop  # noqa: E402
-from soak.kills import complete, processes_of, start, wrong_files  # noqa: E402
+from run_cases import MPI_SETTINGS
+from run_soak import Given
+from same_bits import LOCK, differences
+from soak.shop import RESULTS, Shop, column, open_shop, processes_of, wrong_files
 
 WAYS = ("moved", "deleted", "emptied", "unseen", "unseen in place")
 SECOND = ("moved", "unseen", "unseen in place")  # those with a second run
@@ -46,18 +39,12 @@ def elsewhere(work: Path) -> dict[str, str]:
     return {**os.environ, **MPI_SETTINGS, "LD_PRELOAD": str(library)}
 
 
-def second_run(shop: Workshop, way: str, folder: Path, work: Path) -> subprocess.Popen[bytes]:
+def second_run(shop: Shop, way: str, folder: Path, work: Path) -> subprocess.Popen[str]:
     """Begin the second run, where the way has one."""
-    words = ["--output", str(folder)]
+    words = ["--output", folder]
     if way == "unseen in place":
-        words = ["--restart", str(folder / "restart-a.h5")]
-    return subprocess.Popen(
-        [*shop.machine.command, *words, str(shop.case)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        env=elsewhere(work) if way.startswith("unseen") else {**os.environ, **MPI_SETTINGS},
-    )
+        words = ["--restart", folder / "restart-a.h5"]
+    return shop.start(*words, **({"env": elsewhere(work)} if way.startswith("unseen") else {}))
 
 
 def disturb(way: str, folder: Path, kept: Path) -> None:
@@ -80,14 +67,6 @@ def begun(folder: Path, work: Path, way: str) -> bool:
     return all((folder / name).exists() for name in RESULTS)
 
 
-def rows_of(folder: Path) -> int:
-    """Complete rows of a run; none where there is no file yet, or half a row."""
-    try:
-        return complete("run.h5", contents(folder / "run.h5"))
-    except (OSError, RuntimeError, KeyError):
-        return 0
-
-
 def wrong_results(whole: Path, folder: Path, way: str) -> list[str]:
     """Where the second run differs from an undisturbed one; in place restart files begin with the
     other of the two."""
@@ -107,13 +86,13 @@ def wrong_end(code: int, said: str, folder: Path, early: bool) -> list[str]:
     return [] if well or (code == 0 and not early) else [f"the first: exit code {code}: {said}"]
 
 
-def trial(shop: Workshop, way: str, seconds: float, work: Path) -> tuple[str, list[str]]:
+def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[str]]:
     """One folder after about so many seconds: how the first run ended, and what does not hold."""
     folder, kept = work / "run", work / "kept"
     for path in work.glob("run*"):
         shutil.rmtree(path)
     shutil.rmtree(kept, ignore_errors=True)
-    first = start(shop, folder)
+    first = shop.start("--output", folder)
     wanted = folder / ("restart-a.h5" if way == "unseen in place" else "run.lock")
     while not wanted.exists() and first.poll() is None:
         time.sleep(0.001)
@@ -121,17 +100,19 @@ def trial(shop: Workshop, way: str, seconds: float, work: Path) -> tuple[str, li
     still = processes_of(shop, first.pid)
     for pid in still:  # whatever it was about to do comes when the other is at work
         os.kill(pid, signal.SIGSTOP)
-    early = rows_of(folder) < rows_of(shop.whole) - 2
+    early = (
+        len(column(folder, "series/wall_time")) < len(column(shop.whole, "series/wall_time")) - 2
+    )
     disturb(way, folder, kept)
     second = second_run(shop, way, folder, work) if way in SECOND else None
     while second and second.poll() is None and not begun(folder, work, way):
         time.sleep(0.001)
     for pid in still:
         os.kill(pid, signal.SIGCONT)
-    said = first.communicate(timeout=120)[1].decode()
+    said = first.communicate(timeout=120)[1]
     found = wrong_end(first.returncode, said, folder, early)
     if second is not None:
-        end = second.communicate(timeout=120)[1].decode()
+        end = second.communicate(timeout=120)[1]
         found += [] if second.returncode == 0 else [f"the second: {end.strip()}"]
         found += [f"the second: {line}" for line in wrong_results(shop.whole, folder, way)]
     if way == "unseen":
@@ -139,7 +120,7 @@ def trial(shop: Workshop, way: str, seconds: float, work: Path) -> tuple[str, li
     if kept.exists() and first.returncode == 0:
         found += [f"the first: {line}" for line in differences(shop.whole, kept)]
     elif kept.exists() and (kept / "run.h5").stat().st_size > 0:  # else it had not begun
-        found += [f"the first: {line}" for line in wrong_files(kept, shop.whole)]
+        found += [f"the first: {line}" for line in wrong_files(shop, kept)]
     if way == "emptied" and first.returncode == 4 and list(folder.iterdir()):
         found.append("the empty folder holds something")
     if way == "deleted" and folder.exists():
@@ -147,36 +128,13 @@ def trial(shop: Workshop, way: str, seconds: float, work: Path) -> tuple[str, li
     return f"exit {first.returncode}", found
 
 
-def soak(n: int, shop: Workshop, seed: int, work: Path) -> int:
-    """Number of trials in which something does not hold."""
-    draw, failed = random.Random(seed), 0
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """Every way in turn."""
+    shop, draw = open_shop(given.machine(), work), random.Random(given.seed)
     began = time.monotonic()
-    start(shop, work / "timed").communicate()
+    shop.run("--output", work / "timed")
     whole = time.monotonic() - began
-    for i in range(n):
+    for i in range(given.n or 100):
         way, seconds = WAYS[i % len(WAYS)], draw.uniform(0.0, 0.7 * whole)
         said, found = trial(shop, way, seconds, work)
-        print(f"{i:4d} {way:16} {seconds:6.3f} s {'FAILS' if found else 'holds'}  {said}")
-        print("".join(f"    {line}\n" for line in found[:6]), end="", flush=True)
-        failed += bool(found)
-    print(f"{failed} of {n} trials fail")
-    return failed
-
-
-def main() -> None:
-    """Print a line per trial; the exit code says whether any failed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("n", type=int, nargs="?", default=100, help="trials")
-    parser.add_argument("--ranks", type=int, default=1)
-    parser.add_argument("--program", type=Path)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    name = "mics" if options.ranks == 1 else "mics_mpi"
-    machine = Machine((options.program or ROOT / name).resolve(), options.ranks, 1)
-    with tempfile.TemporaryDirectory() as folder:
-        shop = open_shop(machine, Path(folder))
-        raise SystemExit(int(soak(options.n, shop, options.seed, Path(folder)) > 0))
-
-
-if __name__ == "__main__":
-    main()
+        yield f"{way:16} {seconds:6.3f} s {said}", found

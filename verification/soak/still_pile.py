@@ -1,25 +1,19 @@
-"""A pile that lies still in water stays still, for as long as anybody waits.
+"""A pile at rest under water: blocks that lie on one another do not creep.
 
-usage: python verification/soak/still_pile.py [SECONDS] [--settle SECONDS] [--program ./mics]
-
-Three cubes, one upon two, come to rest in a small tank; then SECONDS (an hour) are simulated, with
-`&contact sleep` on and off. From the end of the time to settle to the end of the run no block may
-creep faster than 1e-6 m/s, its corners not by its turning either, and the liquid must stay.
+Three cubes, one upon two, come to rest in a small tank; then an hour is simulated (`--n`: seconds),
+with `&contact sleep` on and off. From 5 s on to the end of the run no block may creep faster than
+1e-6 m/s, its corners not by its turning either, and the liquid must stay.
 """
 
-import argparse
-import subprocess
-import sys
-import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
+from micstools.reading.reader import Run
+from run_cases import Machine, run
+from run_soak import Given
 
-from micstools.reading.reader import Run  # noqa: E402
-
+SETTLE = 5.0  # s
 MOST_CREEP = 1.0e-6  # m/s
 MOST_DRIFT = 1.0e-9  # of the liquid, relative
 EDGE = 0.02  # m
@@ -39,53 +33,31 @@ CASE = """&run
 """
 
 
-def creep(
-    program: Path, seconds: float, settle: float, sleep: bool, work: Path
-) -> tuple[str, bool]:
-    """What a run showed, and whether it lay still."""
+def creep(machine: Machine, seconds: float, sleep: bool, work: Path) -> tuple[str, list[str]]:
+    """What a run showed, and what does not hold."""
     case, began = work / f"{sleep}.nml", time.monotonic()
     word = ".true." if sleep else ".false."
     row = min(10.0, seconds / 10)
-    case.write_text(CASE.format(t_end=seconds + settle, row=row, sleep=word))
+    case.write_text(CASE.format(t_end=seconds + SETTLE, row=row, sleep=word))
     folder = work / f"run-{sleep}"
-    command = [program, "--quiet", "--threads", "1", "--output", folder, case]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    if done.returncode != 0:
-        return f"sleep = {word}: exit code {done.returncode}: {done.stderr.strip()}", False
-    run = Run(folder)
-    first = int((run.bodies.time >= settle).argmax())
-    past = float(run.bodies.time[-1] - run.bodies.time[first])
-    moved = abs(run.bodies.position[-1] - run.bodies.position[first]).max() / past
-    turned = EDGE * abs(run.bodies.quaternion[-1] - run.bodies.quaternion[first]).max() / past
-    farthest = abs(run.bodies.position[first:] - run.bodies.position[first]).max()
-    drift = abs(run.series.liquid_volume_drift).max()
+    run(case, folder, machine)
+    found = Run(folder)
+    first = int((found.bodies.time >= SETTLE).argmax())
+    past = float(found.bodies.time[-1] - found.bodies.time[first])
+    moved = abs(found.bodies.position[-1] - found.bodies.position[first]).max() / past
+    turned = EDGE * abs(found.bodies.quaternion[-1] - found.bodies.quaternion[first]).max() / past
+    farthest = abs(found.bodies.position[first:] - found.bodies.position[first]).max()
+    drift = abs(found.series.liquid_volume_drift).max()
     said = (
         f"sleep = {word}: {past:.0f} s: creep {moved:.1e} m/s, turning {turned:.1e} m/s, "
         f"farthest {farthest:.1e} m, drift of the liquid {drift:.1e}, "
-        f"{len(run.bodies.time)} rows, {time.monotonic() - began:.0f} s of wall time"
+        f"{len(found.bodies.time)} rows, {time.monotonic() - began:.0f} s of wall time"
     )
-    return said, max(moved, turned) < MOST_CREEP and drift < MOST_DRIFT
+    still = max(moved, turned) < MOST_CREEP and drift < MOST_DRIFT
+    return said, [] if still else ["it creeps, or liquid is lost"]
 
 
-def main() -> int:
-    """Command line; 1 if a pile crept."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("seconds", type=float, nargs="?", default=3600.0)
-    parser.add_argument("--settle", type=float, default=5.0)
-    parser.add_argument("--program", type=Path, default=ROOT / "mics")
-    chosen = parser.parse_args()
-    program, failed = chosen.program.resolve(), False
-    with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(2) as pool:
-        runs = [
-            pool.submit(creep, program, chosen.seconds, chosen.settle, sleep, Path(work))
-            for sleep in (True, False)
-        ]
-        for run in runs:
-            said, still = run.result()
-            print(said, "" if still else "FAILS", flush=True)
-            failed = failed or not still
-    return int(failed)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """With and without sleep."""
+    for sleep in (True, False):
+        yield creep(given.machine(), given.n or 3600, sleep, work)

@@ -1,29 +1,22 @@
 """Two programs and one result folder: exactly one of them goes on.
 
-usage: python verification/soak/two_programs.py [N] [--program ./mics]
-
-N times, two to four runs are started at the same instant into one folder: a new one, an empty one,
+50 times, two to four runs are started at the same instant into one folder: a new one, an empty one,
 one with older results, or one to be continued from its restart file, in place or by a copy. One
 must run to its end with the bits of an undisturbed run, the others must end with code 2 and name
 the folder and the process that has it; older results stay.
 """
 
-import argparse
 import random
 import re
 import shutil
 import socket
-import subprocess
-import sys
-import tempfile
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "verification"))
-
-from same_bits import LOCK, differences  # noqa: E402
+from run_soak import Given
+from same_bits import LOCK, differences
+from soak.shop import Shop, open_shop
 
 CASE = """! About a second, so that nobody ends before the last has begun.
 &run
@@ -39,26 +32,7 @@ CASE = """! About a second, so that nobody ends before the last has begun.
 STARTS = ("new", "empty", "used", "in place", "copy into used")
 
 
-@dataclass(frozen=True)
-class Workshop:
-    """What all trials have in common."""
-
-    program: Path
-    case: Path
-    whole: Path  # results of the undisturbed run
-
-    def start(self, *options: str) -> subprocess.Popen[str]:
-        """Start a quiet run on one thread."""
-        return subprocess.Popen(
-            [str(self.program), "--quiet", "--threads", "1", *options, str(self.case)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-
-def options_of(start: str, shop: Workshop, folder: Path) -> list[str]:
+def options_of(start: str, shop: Shop, folder: Path) -> list[str]:
     """Make the folder what it has to be; what the program is then told."""
     if start == "empty":
         folder.mkdir()
@@ -81,7 +55,7 @@ def wrong_loser(code: int, said: str, folder: Path, others: set[int]) -> str:
     return ""
 
 
-def trial(shop: Workshop, start: str, programs: int, folder: Path) -> list[str]:
+def trial(shop: Shop, start: str, programs: int, folder: Path) -> list[str]:
     """All that does not hold when so many programs start at once."""
     options = options_of(start, shop, folder)
     runs = [shop.start(*options) for _ in range(programs)]
@@ -91,7 +65,7 @@ def trial(shop: Workshop, start: str, programs: int, folder: Path) -> list[str]:
     for pid, (said, code) in ends.items():
         wrong = "" if code == 0 else wrong_loser(code, said, folder, ends.keys() - {pid})
         found += [wrong] if wrong else []
-    found += [line for line in differences(shop.whole, folder) if not line.startswith("restart-")]
+    found += shop.unlike(folder)
     older = folder.with_name(f"{folder.name}.bak-1")
     if older.exists() != (start in ("used", "copy into used")):
         found.append(f"{older.name} is {'' if older.exists() else 'not '}there")
@@ -100,7 +74,7 @@ def trial(shop: Workshop, start: str, programs: int, folder: Path) -> list[str]:
     return found
 
 
-def late_comer(shop: Workshop, folder: Path) -> list[str]:
+def late_comer(shop: Shop, folder: Path) -> list[str]:
     """Programs that come when the first has rows: all are refused, results can be read."""
     first = shop.start("--output", str(folder))
     while not (folder / "run.h5").exists() and first.poll() is None:
@@ -119,7 +93,7 @@ def late_comer(shop: Workshop, folder: Path) -> list[str]:
     return found + differences(shop.whole, folder)
 
 
-def killed(shop: Workshop, folder: Path) -> list[str]:
+def killed(shop: Shop, folder: Path) -> list[str]:
     """A killed run leaves its lock file, which holds nobody up."""
     first = shop.start("--output", str(folder))
     while not (folder / "restart-a.h5").exists() and first.poll() is None:
@@ -131,55 +105,19 @@ def killed(shop: Workshop, folder: Path) -> list[str]:
     said = again.communicate(timeout=300)[1]
     found += [] if again.returncode == 0 else [f"after a kill: {said.strip()}"]
     found += [f"{LOCK} is left over"] if (folder / LOCK).exists() else []
-    return found + [d for d in differences(shop.whole, folder) if not d.startswith("restart-")]
+    return found + shop.unlike(folder)
 
 
-def open_shop(program: Path, work: Path) -> Workshop:
-    """Make the undisturbed run."""
-    case = work / "case.nml"
-    case.write_text(CASE)
-    shop = Workshop(program, case, work / "whole")
-    first = shop.start("--output", str(shop.whole))
-    said = first.communicate(timeout=300)[1]
-    if first.returncode != 0:
-        raise RuntimeError(f"the undisturbed run fails: {said}")
-    return shop
-
-
-def soak(n: int, program: Path, work: Path, seed: int) -> int:
-    """Number of trials in which something does not hold."""
-    shop = open_shop(program, work)
-    draw, failed = random.Random(seed), 0
-    for i in range(n):
-        start = (*STARTS, "late", "killed")[i % (len(STARTS) + 2)]
-        programs = draw.choice((2, 2, 3, 4))
-        folder = work / f"trial-{i}" / "run"
+def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
+    """Every start in turn."""
+    shop, draw = open_shop(given.machine(), work, CASE), random.Random(given.seed)
+    for i in range(given.n or 50):
+        how = (*STARTS, "late", "killed")[i % (len(STARTS) + 2)]
+        programs, folder = draw.choice((2, 2, 3, 4)), work / f"trial-{i}" / "run"
         folder.parent.mkdir()
-        if start == "late":
-            found = late_comer(shop, folder)
-        elif start == "killed":
-            found = killed(shop, folder)
+        if how in STARTS:
+            found = trial(shop, how, programs, folder)
         else:
-            found = trial(shop, start, programs, folder)
-        print(f"{i:4d} {start:15} {programs} {'FAILS' if found else 'holds'}", flush=True)
-        print("".join(f"    {line}\n" for line in found), end="", flush=True)
-        failed += bool(found)
+            found = (late_comer if how == "late" else killed)(shop, folder)
+        yield f"{how:15} {programs}", found
         shutil.rmtree(folder.parent)
-    print(f"{failed} of {n} trials fail")
-    return failed
-
-
-def main() -> None:
-    """Print a line per trial; the exit code says whether any failed."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("n", type=int, nargs="?", default=50, help="trials")
-    parser.add_argument("--program", type=Path, default=ROOT / "mics")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        program = options.program.resolve()
-        raise SystemExit(int(soak(options.n, program, Path(folder), options.seed) > 0))
-
-
-if __name__ == "__main__":
-    main()
