@@ -1,6 +1,6 @@
 """The linear solver gives the same bits on any number of processes.
 
-`test_solvers multigrid` prints one line `solution NAME CELLS ITERATIONS CHECKSUM` for each of its systems.
+`test_solvers multigrid` prints a line `solution NAME CELLS ITERATIONS CHECKSUM` for each system.
 """
 
 import os
