@@ -34,27 +34,10 @@ contains
       .and. options%threads == 3 .and. options%case_file == 'case.nml' .and. problems%n == 0)
     call parse('-')
     call check('standard input', options%case_file == '' .and. problems%n == 0)
-    call refused('--plan a.h5', "--plan = 'a.h5': goes with --check")
-    call refused('--chek', "unknown option '--chek'; the nearest is --check (see --help)")
-    call refused('--thread=2', "unknown option '--thread'; the nearest is --threads (see --help)")
-    call refused('-output', "unknown option '-output'; the nearest is --output (see --help)")
-    call refused('--threads many', "--threads = 'many': must be a whole number from 1 to 1024")
-    call refused('--threads 0', "--threads = '0': must be a whole number from 1 to 1024")
-    call refused('--threads 2.5', "--threads = '2.5': must be a whole number from 1 to 1024")
     call parse('--max-wall 12:30')
     call check('hours and minutes', nint(options%max_wall), 45000)
     call parse('--max-wall=0:00:07')
     call check('seconds, too', nint(options%max_wall), 7)
-    call refused('--max-wall 90', "--max-wall = '90': must be a time HH:MM or HH:MM:SS above 0:00")
-    call refused('--max-wall 0:00', &
-      "--max-wall = '0:00': must be a time HH:MM or HH:MM:SS above 0:00")
-    call refused('--max-wall 1:60', &
-      "--max-wall = '1:60': must be a time HH:MM or HH:MM:SS above 0:00")
-    call refused('--max-wall', 'option --max-wall needs hours and minutes, HH:MM, behind it')
-    call refused('--restart', 'option --restart needs a file name behind it')
-    call refused('--output --quiet', 'option --output needs a folder behind it')
-    call refused('--quiet=yes', "option --quiet takes no value, got 'yes'")
-    call refused('a.nml b.nml', "two case files given, 'a.nml' and 'b.nml'")
     call parse('--output out --threads 3 --quiet --max-wall 1:05 input/a.nml')
     call check('how to go on', restart_command('./mics', 1, options, 'out/restart-a.h5') &
       == './mics --restart out/restart-a.h5 --threads 3 --max-wall 1:05 --quiet ' &
@@ -84,13 +67,5 @@ contains
     problems = none
     call parse_arguments(arguments, options, problems)
   end subroutine parse
-
-  subroutine refused(line, message)
-    character(*), intent(in) :: line, message
-
-    call parse(line)
-    call check(line//' refused', problems%n, 1)
-    if (problems%n == 1) call check(line//': message', problems%message(1) == message)
-  end subroutine refused
 
 end module test_command_line_m

@@ -1,9 +1,8 @@
-!> The bed: its file, its volume in cells and faces, distances, what is refused.
+!> The bed: its file, its volume in cells and faces, distances.
 module test_bed_m
   use, intrinsic :: iso_fortran_env, only: real32, int32
   use kinds_m, only: wp
   use check_m, only: check
-  use errors_m, only: problems_t
   use rotations_m, only: rotate
   use case_types_m, only: case_t
   use grid_m, only: grid_t, grid_init, n_halo
@@ -22,7 +21,7 @@ module test_bed_m
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use bed_file_m, only: bed_form_t, read_bed_file
-  use bed_m, only: bed_t, make_bed, set_bed, bed_covers, bed_distance, bed_place
+  use bed_m, only: bed_t, set_bed, bed_covers, bed_distance, bed_place
   implicit none
   private
   public :: test_bed
@@ -35,7 +34,6 @@ contains
 
   subroutine test_bed()
     call files()
-    call odd_stl_files()
     call volume_of_slope()
     call volume_of_closed_form()
     call periodic_bed()
@@ -43,7 +41,6 @@ contains
     call distance_from_trench()
     call depth_in_bed()
     call edge_on_saddle()
-    call refusals()
   end subroutine test_bed
 
   !> A tank with a map of the plane z = slope.(x, y, 1) of n points from x0 on.
@@ -70,7 +67,7 @@ contains
     call check('the map is read: '//message, len(message) == 0)
   end subroutine sloping_tank
 
-  !> One triangle in both forms of STL, a map, and everything that may be wrong with them.
+  !> One triangle in both forms of STL, and a map.
   subroutine files()
     type(bed_form_t) :: form
     character(:), allocatable :: message
@@ -87,110 +84,22 @@ contains
     call read_bed_file('a.stl', 'stl', form, message)
     call check('ASCII STL: '//message, size(form%triangle, 2), 1)
     call check('its corners', reshape(form%point, [9]), real(corner, wp), 1.0e-7_wp)
-    call write_binary_stl(corner, '')
+    call write_binary_stl(corner)
     call read_bed_file('b.stl', 'stl', form, message)
     call check('binary STL: '//message, size(form%triangle, 2), 1)
     call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
-    call bad('b.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
-      //'heights; an STL file is read with kind = ''stl''')
-    call write_text('a.txt', 'x'//achar(27)//'[2J')
-    call bad('a.txt', 'heightmap', 'line 1: ''x?[2J'' stands where a whole number should')
-    call bad('missing.txt', 'heightmap', 'there is no such file, or it may not be read')
-    call write_text('a.txt', '')
-    call bad('a.txt', 'heightmap', 'the file is empty')
-    call bad('a.txt', 'stl', 'the file is empty')
-    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'3 x')
-    call bad('a.txt', 'heightmap', 'line 3: ''x'' stands where a number should')
-    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'3 NaN')
-    call bad('a.txt', 'heightmap', 'line 3: ''NaN'' stands where a number should')
-    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'-9999 3')
-    call bad('a.txt', 'heightmap', &
-      'line 3: is the height -9999 a mark of a missing one (NODATA)? Every point needs a ' &
-      //'height, fill the gaps first')
-    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3')
-    call bad('a.txt', 'heightmap', 'line 2: the file ends where a number should stand')
-    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3 4 5')
-    call bad('a.txt', 'heightmap', &
-      'line 2: ''5'' stands where the end of 4 heights should')
-    call write_text('a.txt', '1 2 0 0 1 1'//lf//'1 2')
-    call bad('a.txt', 'heightmap', 'line 1: a map of heights needs two points at least in x and y')
-    call write_text('a.txt', '2 2 0 0 -1 1'//lf//'1 2 3 4')
-    call bad('a.txt', 'heightmap', 'line 1: the spacing must be positive')
-    call write_text('a.txt', '2000 2000 0 0 1 1'//lf//'1 2 3')
-    call bad('a.txt', 'heightmap', 'line 1: the file does not hold 4000000 heights')
-    call write_text('a.stl', 'solid'//lf//'facet'//lf//'vertex 1 2 3'//lf//'vertex 1 2 4'//lf &
-      //'endfacet'//lf)
-    call bad('a.stl', 'stl', 'line 5: a facet of the file does not have three corners')
-    call write_text('a.stl', 'solid'//lf//'vertex 1 2 3'//lf//'vertex 1 2 4'//lf)
-    call bad('a.stl', 'stl', 'line 2: a vertex stands outside of a facet')
-    call write_text('a.stl', 'solid'//lf//'facet'//lf//'vertex 1 2 3'//lf//'facet'//lf)
-    call bad('a.stl', 'stl', 'line 4: a facet begins before the last one ends')
-    call write_text('a.stl', 'solid a facet with a vertex'//lf//'facet'//lf//'vertex 1 2 3'//lf)
-    call bad('a.stl', 'stl', 'line 4: the file ends inside a facet')
-    call write_text('a.stl', 'solid a facet with a vertex'//lf//'endsolid')
-    call bad('a.stl', 'stl', 'line 2: the file holds no facets')
-    call write_text('a.stl', 'hollow')
-    call bad('a.stl', 'stl', &
-      'line 1: ''hollow'' stands where ''solid'', the start of an STL file, should')
   end subroutine files
 
-  !> Keywords in capitals or in two words, a byte too much, coordinates of a survey.
-  subroutine odd_stl_files()
-    real(real32), parameter :: corner(9) = [0.0, 0.0, 0.1, 1.0, 0.0, 0.2, 0.0, 1.0, 0.3]
-    character(*), parameter :: vertices = 'VERTEX 0 0 .1'//lf//'Vertex 1 0 .2'//lf//'vertex 0 1 .3'
-    character(*), parameter :: far = 'vertex 5621080 0 0'//lf//'vertex 5621080.5 0 0'//lf
-    type(bed_form_t) :: form
-    character(:), allocatable :: message
-
-    call write_text('a.stl', 'SOLID A'//lf//'FACET NORMAL 0 0 1'//lf//'OUTER LOOP'//lf//vertices &
-      //lf//'ENDLOOP'//lf//'ENDFACET'//lf//'ENDSOLID A'//lf)
-    call read_bed_file('a.stl', 'stl', form, message)
-    call check('capitals: '//message, size(form%triangle, 2), 1)
-    call bad('a.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
-      //'heights; an STL file is read with kind = ''stl''')
-    call write_text('a.stl', 'solid a'//lf//'facet normal 0 0 1'//lf//'outer loop'//lf//vertices &
-      //lf//'end loop'//lf//'end facet'//lf//'End Solid a'//lf)
-    call read_bed_file('a.stl', 'stl', form, message)
-    call check('end solid: '//message, size(form%triangle, 2), 1)
-    call write_binary_stl(corner, lf)
-    call read_bed_file('b.stl', 'stl', form, message)
-    call check('a byte too much: '//message, size(form%triangle, 2), 1)
-    call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
-    call write_binary_stl(corner, repeat('x', 50))
-    call read_bed_file('b.stl', 'stl', form, message)
-    call check('a facet too much is none', len(message) > 0)
-    call write_binary_stl(corner + 4.0e6_real32, '')
-    call bad('b.stl', 'stl', 'lies too far from zero: coordinates of 4000001 m are rounded to ' &
-      //'0.25 m in single precision, and the form is 1 m long; move it near zero where it was ' &
-      //'made, and write it anew')
-    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621081.1 0 0'//lf//'endfacet')
-    call read_bed_file('a.stl', 'stl', form, message)
-    call check('flat facets far from zero: '//message, index(message, 'lies too far') == 1)
-    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621080 .1 0'//lf//'endfacet')
-    call read_bed_file('a.stl', 'stl', form, message)
-    call check('far from zero with all digits: '//message, len(message) == 0)
-  end subroutine odd_stl_files
-
-  !> A binary file of one facet, and what follows it.
-  subroutine write_binary_stl(corner, more)
+  !> A binary file of one facet.
+  subroutine write_binary_stl(corner)
     real(real32), intent(in) :: corner(9)
-    character(*), intent(in) :: more
     integer :: unit
 
     open (newunit=unit, file='b.stl', access='stream', form='unformatted', status='replace')
     write (unit) 'solid'//repeat(' ', 75), 1_int32, [0.0_real32, 0.0_real32, 1.0_real32], corner, &
-      'xx', more
+      'xx'
     close (unit)
   end subroutine write_binary_stl
-
-  subroutine bad(file, kind, expected)
-    character(*), intent(in) :: file, kind, expected
-    type(bed_form_t) :: form
-    character(:), allocatable :: message
-
-    call read_bed_file(file, kind, form, message)
-    call check(file//': '//message, message == expected)
-  end subroutine bad
 
   subroutine write_text(file, text)
     character(*), intent(in) :: file, text
@@ -616,88 +525,5 @@ contains
     call check('as deep as it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
       1.0e-12_wp)
   end subroutine edge_on_saddle
-
-  !> What `--check` refuses.
-  subroutine refusals()
-    type(case_t) :: case
-    type(bed_form_t) :: form
-
-    call sloping_tank(case, form)
-    call refused(case, '', 'the slope')
-    case%grid%origin(1) = -0.02_wp
-    call refused(case, 'the map does not cover the tank', 'a short map')
-    case%grid%origin(1) = 0.0_wp
-    case%grid%length(3) = 0.04_wp
-    call refused(case, 'out of the tank', 'a high bed')
-    case%grid%length(3) = 0.09_wp
-    case%grid%origin(3) = 0.06_wp
-    call refused(case, 'the bed lies below the tank', 'a low bed')
-    case%grid%origin(3) = 0.0_wp
-    case%boundary%kind(:, 1) = 'periodic'
-    call refused(case, 'as long as the period', 'a map longer than the period')
-    case%boundary%kind(:, 1) = 'slip'
-    call write_text('a.txt', '2 2 0 0 100 100'//lf//'20 20 20 20')
-    case%bed%file = 'a.txt'
-    call refused(case, 'are its coordinates in mm?', 'millimetres')
-    case%bed%file = 'a.stl'
-    case%bed%kind = 'stl'
-    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 1)
-    call refused(case, '', 'a closed pyramid')
-    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, -1)
-    call refused(case, 'looks down with no solid above it', 'a pyramid inside out')
-    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 0)
-    call refused(case, 'open edges inside the tank', 'a pyramid without a side')
-    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 2)
-    call refused(case, 'solid lies in solid', 'two pyramids in one another')
-    call write_stl([0.53_wp, 0.03_wp, 0.02_wp], 0.03_wp, 1)
-    call refused(case, 'outside the tank in x', 'a pyramid elsewhere')
-    case%grid%origin(1) = 354200.0_wp
-    call write_stl([354200.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, -1)
-    call refused(case, 'x, y, z = 354200.0', 'a pyramid inside out in a survey')
-  end subroutine refusals
-
-  subroutine refused(case, expected, name)
-    type(case_t), intent(in) :: case
-    character(*), intent(in) :: expected, name
-    type(bed_t) :: bed
-    type(problems_t) :: problems
-
-    call make_bed(case, bed, problems)
-    if (len(expected) == 0) then
-      call check(name//' is good', problems%n, 0)
-      if (problems%n == 0) return
-    end if
-    call check(name//' is refused', problems%n, 1)
-    if (problems%n == 1) call check(name//': '//problems%message(1), &
-      index(problems%message(1), expected) > 0)
-  end subroutine refused
-
-  !> A tetrahedron as ASCII STL: 1 good, -1 inside out, 0 without a facet, 2 twice.
-  subroutine write_stl(corner, edge, how)
-    real(wp), intent(in) :: corner(3), edge
-    integer, intent(in) :: how
-    integer, parameter :: face(3, 4) = reshape([1, 3, 2, 1, 2, 4, 2, 3, 4, 1, 4, 3], [3, 4])
-    real(wp) :: p(3, 4)
-    integer :: unit, f, c, copy
-
-    p = spread(corner, 2, 4)
-    do c = 1, 3
-      p(c, c + 1) = p(c, c + 1) + edge
-    end do
-    open (newunit=unit, file='a.stl', status='replace')
-    write (unit, '(a)') 'solid pyramid'
-    do copy = 1, max(1, how)
-      do f = 1, merge(3, 4, how == 0)
-        write (unit, '(a)') 'facet normal 0 0 0', 'outer loop'
-        do c = 1, 3
-          write (unit, '(a, 3es25.16)') 'vertex', &
-            p(:, face(merge(4 - c, c, how < 0), f)) + 0.005_wp*real(copy - 1, wp)
-        end do
-        write (unit, '(a)') 'endloop', 'endfacet'
-      end do
-    end do
-    write (unit, '(a)') 'endsolid pyramid'
-    close (unit)
-  end subroutine write_stl
 
 end module test_bed_m

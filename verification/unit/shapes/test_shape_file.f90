@@ -1,4 +1,4 @@
-!> Blocks from files: the three forms give the block that was written, bad files one clear message.
+!> Blocks from files: the three forms give the block that was written.
 module test_shape_file_m
   use kinds_m, only: wp
   use check_m, only: check
@@ -10,14 +10,6 @@ module test_shape_file_m
   private
   public :: test_shape_file
 
-  character(*), parameter :: lf = new_line('a')
-  !> A tetrahedron with legs of length 1 along the axes.
-  character(*), parameter :: one_tet = 'mics-shape 1'//lf//'points 4'//lf//'0 0 0  1 0 0  0 1 0' &
-    //'  0 0 1 # the last'//lf//'tets 1'//lf//'1 2 3 4'//lf
-  character(*), parameter :: nodes_22 = '$MeshFormat'//lf//'2.2 0 8'//lf//'$EndMeshFormat'//lf &
-    //'$Nodes'//lf//'4'//lf//'1 0 0 0'//lf//'7 1 0 0'//lf//'9 0 1e-0 0'//lf//'4 0 0 1'//lf &
-    //'$EndNodes'//lf//'$Elements'//lf
-
 contains
 
   subroutine test_shape_file()
@@ -26,21 +18,8 @@ contains
     call round_trip('dolos', -1)
     call round_trip('tetrapod', -1)
     call round_trip('reef_cube', 86)   ! 72 would do; neighbours are joined in turn
-    call small_files()
-    call faults_of_form()
-    call faults_of_order()
-    call faults_of_mesh()
     call merged_net()
   end subroutine test_shape_file
-
-  subroutine write_text(file, text)
-    character(*), intent(in) :: file, text
-    integer :: unit
-
-    open (newunit=unit, file=file, access='stream', form='unformatted', status='replace')
-    write (unit) text
-    close (unit)
-  end subroutine write_text
 
   subroutine read_file(file, scale, shape, message)
     character(*), intent(in) :: file
@@ -239,130 +218,5 @@ contains
 
     w = [u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
   end function turn
-
-  !> Text of every system, numbers next to nothing, a point outside the tetrahedron.
-  subroutine small_files()
-    type(shape_t) :: s
-    character(:), allocatable :: message
-
-    call write_text('a', one_tet)
-    call read_file('a', 2.0_wp, s, message)
-    call check('one tetrahedron'//message, len(message) == 0)
-    call check('one tetrahedron: volume', s%volume, 8.0_wp/6, 1e-15_wp)
-    call write_text('a', nodes_22//'1'//achar(13)//lf//'1 4 0 1 7 9 4'//achar(13)//lf)
-    call read_file('a', 1.0_wp, s, message)
-    call check('Windows line ends'//message, len(message) == 0)
-    call write_text('a', 'mics-shape 1 points 4 1e-330 -1.5e-33 0 1 0 0 0 1 0 0 0 1 tets 1 1 2 3 4')
-    call read_file('a', 1.0_wp, s, message)
-    call check('numbers as good as zero'//message, len(message) == 0)
-  end subroutine small_files
-
-  subroutine faults_of_form()
-    type(shape_t) :: s
-    character(:), allocatable :: message
-    character(*), parameter :: neither = 'is neither a Gmsh .msh file ($MeshFormat) nor a ' &
-      //'mics-shape file; tools/make_shape.py makes one of .stl, .obj and .step'
-
-    call read_file('missing.msh', 1.0_wp, s, message)
-    call check('missing: '//message, message == &
-               'file = ''missing.msh'': there is no such file, or it may not be read')
-    call expect('', neither)
-    call expect('solid cube', neither)
-    call expect('mics-shape 2', 'line 1: mics-shape 2 is unknown, this program reads 1')
-    call expect('mics-shape 1'//lf//'points 2'//lf//'0 0 0 0 x 0', &
-                'line 3: ''x'' stands where a number should')
-    call expect('mics-shape 1'//lf//'points 2'//lf//'0 0 0'//lf//'0 nan 0', &
-                'line 4: ''nan'' stands where a number should')
-    call expect('mics-shape 1 points 2 0 0 0 0', &
-                'line 1: the file ends where a number should stand')
-    call expect('mics-shape 1 points 1000000000', &
-                'line 1: the file does not hold 1000000000 points')
-    call expect('mics-shape 1 points -1', 'line 1: the file does not hold -1 points')
-    call expect('mics-shape 1 points 1 0 0 0'//lf//'tets 1 1 1 1 2', &
-                'line 2: there is no point 2')
-    call expect('mics-shape 1 faces', &
-                'line 1: ''faces'' stands where ''points'' or ''tets'' should')
-    call expect('$MeshFormat'//lf//'2.2 1 8', &
-                'line 2: binary .msh files are not read, save it as ASCII')
-    call expect('$MeshFormat'//lf//'4 0 8', &
-                'line 2: this version of the .msh form is not read, 2.2 and 4.1 are')
-    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9', &
-                'line 13: the file ends where a whole number should stand')
-    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 5'//lf, &
-                'line 13: a tetrahedron has the corner 5, which is no point of the file')
-    call expect(nodes_22//'2'//lf//'1 4 0 1 7 9 4'//lf//'2 5 0 1 7 9 4 1 7 9 4'//lf, &
-                'line 15: holds 1 solid elements that are not tetrahedra')
-    call expect(nodes_22//'1'//lf//'1 11 0 1 7 9 4 1 7 9 4 1 7'//lf, &
-                'line 14: holds 1 solid elements of higher order, mesh with order 1')
-    call expect(nodes_22//'1'//lf//'1 99 0 1 7 9 4'//lf, 'line 13: element type 99 is unknown')
-    call expect(nodes_22//'1'//lf//'1 2 0 1 7 9'//lf, 'holds no tetrahedra; a surface alone has ' &
-                //'to be meshed first (tools/make_shape.py)')
-  end subroutine faults_of_form
-
-  !> Sections that are missing, stand twice or do not hold what they announce.
-  subroutine faults_of_order()
-    character(*), parameter :: head = '$MeshFormat'//lf//'2.2 0 8'//lf//'$EndMeshFormat'//lf
-    character(*), parameter :: elements = '$Elements'//lf//'1'//lf//'1 4 0 1 2 3 4'//lf
-    character(*), parameter :: head_41 = '$MeshFormat 4.1 0 8 $Nodes '
-
-    call expect(head//elements//'$EndElements'//lf, &
-                'line 8: the file ends without points, the section $Nodes')
-    call expect(one_tet//'points 1'//lf//'0 0 0'//lf, 'line 6: ''points'' stands a second time')
-    call expect(one_tet//'tets 1'//lf//'1 2 3 4', 'line 6: ''tets'' stands a second time')
-    call expect('mics-shape 1'//lf//'tets 1'//lf//'1 2 3 4', &
-                'line 2: ''tets'' stands before any ''points''')
-    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$Nodes'//lf//'1'//lf//'1 0 0 0'//lf, &
-                'line 14: ''$Nodes'' stands where $EndElements should')
-    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$EndElements'//lf//'$Nodes'//lf//'1', &
-                'line 15: $Nodes stands a second time')
-    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$EndElements'//lf//'$Elements'//lf//'1', &
-                'line 15: $Elements stands a second time')
-    call expect(head//'$Nodes'//lf//'2'//lf//'1 0 0 0'//lf//'1 1 0 0'//lf//'$EndNodes'//lf &
-                //elements, 'line 7: there are two points 1')
-    call expect(head//'$Nodes'//lf//'1'//lf//'1 0 0 0'//lf//'2 1 0 0'//lf//'$EndNodes'//lf, &
-                'line 7: ''2'' stands where $EndNodes should')
-    call expect(head//'$Nodes'//lf//'1'//lf//'-1 0 0 0'//lf, &
-                'line 6: a point has the number -1, allowed are 1 to 100000000')
-    call expect(head_41//'1 2 1 2 2000000000 1 1 2 1 2 0 0 0 1 1 1 $EndNodes', &
-                'line 1: 2000000000 stands where a dimension, 0 to 3, should')
-    call expect(head_41//'1 2 1 2 3 1 0 1 1 0 0 0 $EndNodes', &
-                'line 1: fewer points than announced')
-    call expect(head_41//'1 1 1 1 3 1 0 2 1 2 0 0 0 1 1 1 $EndNodes', &
-                'line 1: more points than announced')
-    call expect('mics-shape 1'//lf//'points 1'//lf//'0 0 1e30', &
-                'line 3: ''1e30'' is too large a number')
-    call expect('mics-shape 1'//lf//'points 99999999999', &
-                'line 2: ''99999999999'' is too large for a whole number')
-    call expect('mics-shape 1 '//repeat('x', 100000), 'line 1: '''//repeat('x', 57) &
-                //'...'' stands where ''points'' or ''tets'' should')
-  end subroutine faults_of_order
-
-  subroutine faults_of_mesh()
-    character(*), parameter :: five = 'mics-shape 1 points 5 0 0 0 1 0 0 0 1 0 0 0 1 '
-
-    call expect('mics-shape 1 points 4 0 0 0 1 0 0 0 1 0 1 1 0 tets 1 1 2 3 4', &
-                '1 tetrahedra are flat')
-    call expect(five//'1 1 1 tets 2 1 2 3 4 1 2 3 5', 'tetrahedra overlap at 1 of their faces')
-    call expect('mics-shape 1 points 6 0 0 0 1 0 0 0 1 0 0 0 1 0 0 -1 .2 .2 -1 ' &
-                //'tets 3 1 2 3 4 1 2 3 5 1 2 3 6', 'tetrahedra overlap at 1 of their faces')
-    call expect('mics-shape 1 points 8 0 0 0 1 0 0 0 1 0 0 0 1  0 0 0 1 0 0 0 1 0 0 0 -1 ' &
-                //'tets 2 1 2 3 4 5 6 7 8', '3 points stand in the place of another, join them')
-    call expect('mics-shape 1 points 6 0 0 0 1 0 0 0 1 0 0 0 1  0 -1 0 0 -.2 -1 ' &
-                //'tets 2 1 2 3 4 1 2 5 6', 'the surface meets itself along 1 edges')
-    call expect('mics-shape 1 points 8 0 0 0 1 0 0 0 1 0 0 0 1  2 0 0 3 0 0 2 1 0 2 0 1 ' &
-                //'tets 2 1 2 3 4 5 6 7 8', 'falls into 2 separate pieces')
-  end subroutine faults_of_mesh
-
-  !> The file with this text is refused with this message.
-  subroutine expect(text, problem)
-    character(*), intent(in) :: text, problem
-    type(shape_t) :: s
-    character(:), allocatable :: message
-
-    call write_text('bad', text)
-    call read_file('bad', 1.0_wp, s, message)
-    call check('message: '//problem, message == 'file = ''bad'': '//problem)
-    if (message /= 'file = ''bad'': '//problem) write (*, '(2a)') '  got: ', message
-  end subroutine expect
 
 end module test_shape_file_m
