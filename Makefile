@@ -51,8 +51,8 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units everything deps run test verify mutate soak bench bench-contact paper-ensemble \
-  docs reference lint clean help install install-tools FORCE
+.PHONY: all units everything deps run test verify mutate soak worlds bench bench-contact \
+  paper-ensemble docs reference lint clean help install install-tools FORCE
 
 all: $(binary)
 
@@ -69,6 +69,7 @@ help:
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
 	@echo 'make soak     faults many times: kills, full disks, broken files, all builds, ranks; many hours'
+	@echo 'make worlds   N=500 worlds drawn at random from SEED=1 on, judged by laws; LAW=still: by that'
 	@echo 'make bench    time jobs and growth; writes build/bench.json; FULL=1: whole jobs; AGAINST=old.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; 20 minutes.'
@@ -145,8 +146,8 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
 	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@
 
-no_build := deps lint clean help install install-tools run test verify mutate soak bench bench-contact paper-ensemble \
-  docs reference everything $(variants)
+no_build := deps lint clean help install install-tools run test verify mutate soak worlds bench bench-contact \
+  paper-ensemble docs reference everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 # What a source left in the other folder when it began or ceased to use HDF5 is not to be found.
@@ -186,13 +187,22 @@ soak:
 	@$(deps) test
 	@for build in '' MPI=1 DEBUG=1 SAN=1; do $(MAKE) --no-print-directory $$build || exit 1; done
 	@$(PYTHON) verification/run_soak.py
+	@$(MAKE) --no-print-directory worlds
+
+worlds: N := 500
+SEED := 1
+worlds:
+	@$(deps) test
+	@$(MAKE) --no-print-directory
+	@PYTHONPATH=verification:tools $(PYTHON) -m worlds --seed $(SEED) --n $(N) \
+	  $(if $(LAW),--law $(LAW)) $(if $(SHRINK),--shrink)
 
 bench: deps
 	@$(MAKE) --no-print-directory all
 	@$(MAKE) --no-print-directory MPI=1
 	@$(PYTHON) tools/bench.py --out build/bench.json $(if $(FULL),--whole) $(if $(AGAINST),--against $(AGAINST))
 
-N := 64
+bench-contact: N := 64
 THREADS := 1
 bench-contact: deps
 	@$(MAKE) --no-print-directory

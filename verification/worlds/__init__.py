@@ -1,0 +1,1 @@
+"""Worlds drawn at random, and the laws that every right answer obeys."""

@@ -1,0 +1,49 @@
+"""Sums that the flow and the blocks must keep, and water that must not move."""
+
+from pathlib import Path
+
+import numpy as np
+
+from worlds.world import Broken, World
+
+ROUND_OFF = 1e-12  # of the liquid
+STILL = 1e-9  # kinetic energy of the fluid over rho g h^4 with the size h of a cell
+
+
+def stays_still(world: World, folder: Path) -> None:
+    """Water at rest around held blocks stays at rest."""
+    run = world.run(folder, ends=(0,))
+    h = run.grid.spacing.prod() ** (1 / 3)
+    scale = world.value("fluid", "liquid_density") * np.linalg.norm(run.gravity) * h**4
+    worst = float(run.series.kinetic_energy_fluid.max() / scale)
+    if not worst < STILL:
+        raise Broken(f"kinetic energy of the fluid is {worst:.2g} rho g h^4, not below {STILL:g}")
+
+
+def balance(world: World, folder: Path) -> None:
+    """No NaN, liquid to round-off, and mass times acceleration is the sum of the forces."""
+    run = world.run(folder, ends=(0,))
+    s, b = run.series, run.bodies
+    if world.value("run", "physics") in ("coupled", "fluid"):
+        below("drift of the liquid", s.liquid_volume_drift, ROUND_OFF)
+        if world.value("numerics", "coupling") == "monolithic":
+            tolerance = world.value("numerics", "divergence_tolerance")
+            below("divergence, over its tolerance", s.divergence_max[1:] / tolerance, 1.0)
+            below("excess of a cell", s.volume_excess_max, tolerance * s.time[-1] + ROUND_OFF)
+        below("energy over what was put in", np.maximum(np.nan_to_num(s.energy_excess), 0), 0.01)
+    if not b.n:
+        return
+    free = ~b.fixed & (b.entry_time <= b.release_time)
+    there = (b.release_time < b.time[:-1, None]) & free  # a release gives velocity in its step
+    dt = np.diff(b.time)[:, None, None]
+    force = (b.fluid_force + b.contact_force)[1:] + b.mass[:, None] * run.gravity
+    pull = b.mass[:, None] * np.diff(b.velocity, axis=0) / dt
+    scale = np.abs(force).max(axis=2) + b.mass * np.abs(b.velocity[1:]).max(axis=2) / dt[..., 0]
+    error = np.abs(pull - force).max(axis=2) / (scale + b.mass * np.linalg.norm(run.gravity))
+    below("M dU/dt less the forces, over them", np.where(there, error, 0.0), 1e-9)
+
+
+def below(what: str, values: np.ndarray, limit: float) -> None:
+    """No value of any row is larger, or not a number."""
+    if not (np.abs(values) <= limit).all():
+        raise Broken(f"{what}: {np.abs(values).max():.2g}, not below {limit:g}")
