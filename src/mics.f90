@@ -13,10 +13,9 @@ program mics
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
-  use checksum_m, only: checksum_t
   use case_file_m, only: read_text
-  use case_types_m, only: case_t, place_t, begun_t
-  use case_input_m, only: read_case, parameters_text
+  use case_types_m, only: case_t
+  use case_input_m, only: read_case
   use named_files_m, only: look_beside
   use placing_table_m, only: read_places
   use motion_file_m, only: read_motions
@@ -26,9 +25,9 @@ program mics
   use case_plan_m, only: print_plan
   use case_warnings_m, only: find_case_warnings
   use set_up_file_m, only: write_set_up
+  use all_parameters_m, only: all_parameters
   use memory_plan_m, only: require_memory, require_memory_to_start
   use tet_mesh_m, only: shape_t
-  use given_motion_m, only: given_motion_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
   use start_bodies_m, only: read_start
@@ -62,7 +61,7 @@ program mics
   call simulation_init(case, shapes, bed, sim)
   if (len(options%restart) > 0) call go_on()
 
-  call open_output(case, parameters(), options, sim%run_state_t, bed, output)
+  call open_output(case, all_parameters(case, shapes, bed), options, sim%run_state_t, bed, output)
   call stop_on_error()
   call measure(sim, report)
   if (len(options%restart) == 0) then   ! else what was due has been written
@@ -91,82 +90,6 @@ program mics
   call parallel_final()
 
 contains
-
-  !> All values of the case as text, and what the files of shapes and the bed held.
-  function parameters() result(text)
-    character(:), allocatable :: text
-    integer :: s, i
-
-    text = parameters_text(case)
-    do s = 1, size(shapes)
-      if (shapes(s)%kind == 'file') text = text//'! checksum of the shape ' &
-        //trim(shapes(s)%name)//' '//checksum_of(shapes(s))//new_line('a')
-    end do
-    do i = 1, size(case%drop)
-      if (allocated(case%drop(i)%row)) text = text//'! checksum of the places of &drop ' &
-        //to_text(i)//' '//checksum_of_places(case%drop(i)%row)//new_line('a')
-    end do
-    do s = 1, size(case%body)
-      if (case%body(s)%path%n > 0) text = text//'! checksum of the motion of body ' &
-        //to_text(s)//' '//checksum_of_path(case%body(s)%path)//new_line('a')
-    end do
-    if (case%begun%n > 0) text = text//'! checksum of the start '//checksum_of_start(case%begun) &
-      //new_line('a')
-    if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
-  end function parameters
-
-  !> A checksum of the tetrahedra of a shape.
-  function checksum_of(shape) result(text)
-    type(shape_t), intent(in) :: shape
-    character(:), allocatable :: text
-    type(checksum_t) :: checksum
-
-    call checksum%add_reals(size(shape%point), shape%point)
-    call checksum%add_integers(size(shape%tet), shape%tet)
-    text = checksum%text()
-  end function checksum_of
-
-  !> A checksum of the rows of a table of places.
-  function checksum_of_places(row) result(text)
-    type(place_t), intent(in) :: row(:)
-    character(:), allocatable :: text
-    type(checksum_t) :: checksum
-    integer :: r
-
-    do r = 1, size(row)
-      call checksum%add_text(row(r)%shape//row(r)%name)
-      call checksum%add_reals(11, [row(r)%x, row(r)%q, row(r)%v, row(r)%time])
-      call checksum%add_integers(1, [merge(1, 0, row(r)%fixed)])
-    end do
-    text = checksum%text()
-  end function checksum_of_places
-
-  !> A checksum of where blocks begin that another run left.
-  function checksum_of_start(begun) result(text)
-    type(begun_t), intent(in) :: begun
-    character(:), allocatable :: text
-    type(checksum_t) :: checksum
-
-    call checksum%add_integers(begun%n, begun%drop)
-    call checksum%add_integers(begun%n, begun%block)
-    call checksum%add_reals(size(begun%x), begun%x)
-    call checksum%add_reals(size(begun%q), begun%q)
-    call checksum%add_reals(size(begun%v), begun%v)
-    call checksum%add_reals(size(begun%omega), begun%omega)
-    text = checksum%text()
-  end function checksum_of_start
-
-  !> A checksum of the rows of a table of motion.
-  function checksum_of_path(path) result(text)
-    type(given_motion_t), intent(in) :: path
-    character(:), allocatable :: text
-    type(checksum_t) :: checksum
-
-    call checksum%add_reals(path%n, path%time)
-    call checksum%add_reals(size(path%x), path%x)
-    call checksum%add_reals(size(path%q), path%q)
-    text = checksum%text()
-  end function checksum_of_path
 
   !> The program as it was called.
   function program_name() result(name)
@@ -233,8 +156,8 @@ contains
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
     message = ''
-    if (len(options%plan) > 0) call write_set_up(options%plan, case, parameters(), shapes, bed, &
-      message)
+    if (len(options%plan) > 0) call write_set_up(options%plan, case, &
+      all_parameters(case, shapes, bed), shapes, bed, message)
     call broadcast(message)
     if (len(message) > 0) call fatal(exit_files, message)
     call finish()
@@ -255,7 +178,8 @@ contains
     character(:), allocatable :: message
     integer :: info
 
-    call read_restart(options%restart, parameters(), sim%run_state_t, info, message)
+    call read_restart(options%restart, all_parameters(case, shapes, bed), sim%run_state_t, info, &
+      message)
     if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)
     call resume(sim)
   end subroutine go_on

@@ -17,7 +17,7 @@
 !!     /light       with physics = 'light' the level, and of each block wet volume and force
 !!     /contacts    the tangential displacements
 !!
-!! `visit_state` lists all of it. The volume flux through a face is aperture*area*uf + solid_flux.
+!! `list_state` names all of it. The volume flux through a face is aperture*area*uf + solid_flux.
 module restart_m
   use kinds_m, only: wp
   use parallel_m, only: nproc, broadcast, halo_exchange
@@ -27,8 +27,9 @@ module restart_m
   use clock_m, only: clock_resume
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
-  use state_visitors_m, only: checksum_visitor_t, size_visitor_t
+  use state_m, only: list_state, state_groups
+  use state_list_m, only: state_list_t, item_t, item_cells, item_reals, item_integers, &
+    item_logicals
   use file_space_m, only: bytes_for_change
   implicit none
   private
@@ -36,22 +37,7 @@ module restart_m
 
   character(*), parameter :: format_name = 'mics-restart'
   integer, parameter :: format_version = 1
-
-  type, extends(state_visitor_t) :: writer_t
-    type(h5_file_t) :: file
-  contains
-    procedure :: cells => write_cells
-    procedure :: reals => write_reals
-    procedure :: integers => write_integers
-  end type writer_t
-
-  type, extends(state_visitor_t) :: reader_t
-    type(h5_file_t) :: file
-  contains
-    procedure :: cells => read_cells
-    procedure :: reals => read_reals
-    procedure :: integers => read_integers
-  end type reader_t
+  integer, parameter :: max_displacements = 100000000
 
 contains
 
@@ -62,34 +48,32 @@ contains
     type(run_state_t), intent(inout) :: state
     integer, intent(out) :: info                   !! 0: written
     character(:), allocatable, intent(out) :: message
-    type(writer_t) :: writer
-    type(checksum_visitor_t) :: checksum
-    type(size_visitor_t) :: needed
-    integer :: g
+    type(h5_file_t) :: file
+    type(state_list_t) :: list
+    integer :: i
 
-    call visit_state(checksum, state)
-    associate (file => writer%file)
-      call file%create(path, .true.)
-      if (nproc() > 1) then   ! one that failed alone could not stop the others
-        call visit_state(needed, state)
-        call file%reserve(needed%bytes + len(text) + len(parameters) + bytes_for_change)
-      end if
-      call file%attribute('/', 'format', format_name)
-      call file%attribute('/', 'format_version', format_version)
-      call file%attribute('/', 'version', version)
-      call file%attribute('/', 'git_revision', git_revision)
-      call file%attribute('/', 'namelist', text)
-      call file%attribute('/', 'parameters', parameters)
-      do g = 1, size(state_groups)
-        call file%group(trim(state_groups(g)))
-      end do
-      call visit_state(writer, state)
-      call file%attribute('/', 'checksum', checksum%sum%text())
-      call file%close(stored=.true.)
-      info = file%info
-      message = ''
-      if (info /= 0) message = file%message
-    end associate
+    call list_state(state, list)
+    call file%create(path, .true.)
+    if (nproc() > 1) then   ! one that failed alone could not stop the others
+      call file%reserve(list%bytes() + len(text) + len(parameters) + bytes_for_change)
+    end if
+    call file%attribute('/', 'format', format_name)
+    call file%attribute('/', 'format_version', format_version)
+    call file%attribute('/', 'version', version)
+    call file%attribute('/', 'git_revision', git_revision)
+    call file%attribute('/', 'namelist', text)
+    call file%attribute('/', 'parameters', parameters)
+    do i = 1, size(state_groups)
+      call file%group(trim(state_groups(i)))
+    end do
+    do i = 1, list%n
+      call write_item(list%grid, list%item(i), file)
+    end do
+    call file%attribute('/', 'checksum', list%checksum())
+    call file%close(stored=.true.)
+    info = file%info
+    message = ''
+    if (info /= 0) message = file%message
     call broadcast(info)
   end subroutine write_restart
 
@@ -150,26 +134,35 @@ contains
     type(run_state_t), intent(inout) :: state
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
-    type(reader_t) :: reader
-    type(checksum_visitor_t) :: checksum
+    type(h5_file_t) :: file
+    type(state_list_t) :: list
     character(:), allocatable :: written
+    integer :: i, n(2)
 
     written = ''
-    associate (file => reader%file)
-      call file%open(path, .true., .false.)
-      call check_kind(file, parameters, info, message)
-      if (info == 0) call visit_state(reader, state)
-      if (info == 0) call file%read_attribute('/', 'checksum', written)
-      call file%close()
-      if (info /= 0) return
-      info = file%info
-      if (info /= 0) then
-        message = file%message
-        return
-      end if
-    end associate
-    call visit_state(checksum, state)
-    if (checksum%sum%text() == written) return
+    n = 0
+    call file%open(path, .true., .false.)
+    call check_kind(file, parameters, info, message)
+    if (info == 0) then
+      call file%read('/contacts/n', n(1:1))
+      call file%read('/contacts/rest_n', n(2:2))
+      where (n < 0 .or. n > max_displacements) n = 0   ! a damaged file: its checksum shows it
+      state%contacts%displacements%n = n(1)
+      state%contacts%sleep%rest%n = n(2)
+      call list_state(state, list)
+      do i = 1, list%n
+        call read_item(list%grid, list%item(i), file)
+      end do
+      call file%read_attribute('/', 'checksum', written)
+    end if
+    call file%close()
+    if (info /= 0) return
+    info = file%info
+    if (info /= 0) then
+      message = file%message
+      return
+    end if
+    if (list%checksum() == written) return
     info = 1
     message = path//': damaged, its content does not have its checksum'
   end subroutine read_state
@@ -262,90 +255,59 @@ contains
     end do
   end subroutine next_line
 
-  subroutine write_cells(self, name, units, grid, faces, m, a)
-    class(writer_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
+  !> Write an item of the state; of cells each process its part.
+  subroutine write_item(grid, item, file)
     type(grid_t), intent(in) :: grid
-    logical, intent(in) :: faces
-    integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
-                                 grid%first(2):grid%last(2), &
-                                 grid%first(3):grid%last(3), m)
-    real(wp), allocatable :: row(:)
+    type(item_t), intent(in) :: item
+    type(h5_file_t), intent(inout) :: file
     integer :: first(3), last(3), d
 
-    call self%file%new_blocks(name, units, [grid%n + merge(1, 0, faces), m])
-    do d = 1, m
-      call owned_part(grid, faces, d, first, last)
-      allocate (row(product(last - first + 1)))
-      call pack_part(grid, a(:, :, :, d), first, last, row)
-      call self%file%write_block(name, [first, d], [last - first + 1, 1], row)
-      deallocate (row)
-    end do
-  end subroutine write_cells
+    select case (item%kind)
+    case (item_cells)
+      call file%new_blocks(item%name, item%units, item%extent)
+      do d = 1, item%extent(4)
+        call item%part(grid, d, first, last)
+        call file%write_block(item%name, [first, d], [last - first + 1, 1], &
+          [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
+      end do
+    case (item_reals)
+      call file%store_shaped_reals(item%name, item%units, item%extent, item%reals)
+    case default
+      call file%store_shaped_integers(item%name, '1', item%extent, item%numbers())
+    end select
+  end subroutine write_item
 
-  subroutine write_reals(self, name, units, extent, a)
-    class(writer_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in) :: extent(:)
-    real(wp), intent(inout) :: a(product(extent))
-
-    call self%file%store_shaped_reals(name, units, extent, a)
-  end subroutine write_reals
-
-  subroutine write_integers(self, name, extent, a)
-    class(writer_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: extent(:)
-    integer, intent(inout) :: a(product(extent))
-
-    call self%file%store_shaped_integers(name, '1', extent, a)
-  end subroutine write_integers
-
-  !> Faces on the upper side of a periodic domain are those on its lower side: the exchange fills
-  !! them.
-  subroutine read_cells(self, name, units, grid, faces, m, a)
-    class(reader_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
+  !> Read an item of the state. Faces on the upper side of a periodic domain are those on its lower
+  !! side: the exchange fills them.
+  subroutine read_item(grid, item, file)
     type(grid_t), intent(in) :: grid
-    logical, intent(in) :: faces
-    integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
-                                 grid%first(2):grid%last(2), &
-                                 grid%first(3):grid%last(3), m)
+    type(item_t), intent(in) :: item
+    type(h5_file_t), intent(inout) :: file
     real(wp), allocatable :: row(:)
+    integer, allocatable :: numbers(:)
     integer :: first(3), last(3), d
 
-    if (self%file%info /= 0) return
-    do d = 1, m
-      call owned_part(grid, faces, d, first, last)
-      allocate (row(product(last - first + 1)), source=0.0_wp)
-      call self%file%read_block(name, [first, d], [last - first + 1, 1], row)
-      call unpack_part(grid, row, first, last, a(:, :, :, d))
-      deallocate (row)
-      call halo_exchange(a(:, :, :, d), n_halo)
-    end do
-    if (self%file%info /= 0) self%file%message = self%file%message//' ['//units//']'
-  end subroutine read_cells
-
-  subroutine read_reals(self, name, units, extent, a)
-    class(reader_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in) :: extent(:)
-    real(wp), intent(inout) :: a(product(extent))
-
-    if (self%file%info /= 0) return
-    call self%file%read(name, a)
-    if (self%file%info /= 0) self%file%message = self%file%message//' ['//units//']'
-  end subroutine read_reals
-
-  subroutine read_integers(self, name, extent, a)
-    class(reader_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: extent(:)
-    integer, intent(inout) :: a(product(extent))
-
-    call self%file%read(name, a)
-  end subroutine read_integers
+    if (file%info /= 0) return
+    select case (item%kind)
+    case (item_cells)
+      do d = 1, item%extent(4)
+        call item%part(grid, d, first, last)
+        allocate (row(product(last - first + 1)), source=0.0_wp)
+        call file%read_block(item%name, [first, d], [last - first + 1, 1], row)
+        item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d) = &
+          reshape(row, last - first + 1)
+        deallocate (row)
+        call halo_exchange(item%cells(:, :, :, d), n_halo)
+      end do
+    case (item_reals)
+      call file%read(item%name, item%reals)
+    case default
+      numbers = item%numbers()
+      call file%read(item%name, numbers)
+      if (item%kind == item_integers) item%integers = numbers
+      if (item%kind == item_logicals) item%logicals = numbers == 1
+    end select
+    if (file%info /= 0 .and. len(item%units) > 0) file%message = file%message//' ['//item%units//']'
+  end subroutine read_item
 
 end module restart_m

@@ -12,9 +12,12 @@ module sample_state_m
   use displacements_m, only: displacements_t
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
+  use checksum_m, only: checksum_t
+  use state_m, only: list_state
+  use state_list_m, only: state_list_t
   implicit none
   private
-  public :: sample_t, make_sample, fill_cells
+  public :: sample_t, make_sample, fill_cells, checksums_of, first_change
 
   type, extends(run_state_t) :: sample_t
     type(case_t) :: case
@@ -150,5 +153,43 @@ contains
       end do
     end do
   end subroutine fill_cells
+
+  !> A checksum of each item of the state; all processes call.
+  function checksums_of(s) result(text)
+    type(sample_t), intent(inout) :: s
+    character(18), allocatable :: text(:)
+    type(state_list_t) :: list
+    type(checksum_t) :: sum
+    integer :: i
+
+    call list_state(s%run_state_t, list)
+    allocate (text(list%n))
+    do i = 1, list%n
+      sum = checksum_t()
+      call list%item(i)%add_to_checksum(list%grid, sum)
+      text(i) = sum%text()
+    end do
+  end function checksums_of
+
+  !> Name of the first item whose checksum has changed, or 'nothing'.
+  function first_change(before, s) result(name)
+    character(18), intent(in) :: before(:)   !! of `checksums_of`
+    type(sample_t), intent(inout) :: s
+    character(:), allocatable :: name
+    character(18), allocatable :: after(:)
+    type(state_list_t) :: list
+    integer :: i
+
+    name = 'nothing'
+    allocate (after, source=checksums_of(s))
+    call list_state(s%run_state_t, list)
+    do i = list%n, 1, -1
+      if (i > size(before)) then
+        name = list%item(i)%name
+      else if (after(i) /= before(i)) then
+        name = list%item(i)%name
+      end if
+    end do
+  end function first_change
 
 end module sample_state_m

@@ -1,14 +1,12 @@
-!> The registry of the state: nothing is missing, every change shows, sums do not know the ranks.
+!> The list of the state: nothing is missing, every change shows, sums do not know the ranks.
 ! ranks: 2 3
 module test_state_m
-  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
   use kinds_m, only: wp, i8
   use parallel_m, only: nproc, my_rank
   use grid_m, only: grid_t
-  use state_m, only: visit_state, owned_part, pack_part, unpack_part
-  use state_visitors_m, only: checksum_visitor_t, finite_visitor_t, image_visitor_t, &
-    checksum_of_cells
-  use sample_state_m, only: sample_t, make_sample, fill_cells
+  use state_m, only: list_state
+  use state_list_m, only: state_list_t, checksum_of_cells
+  use sample_state_m, only: sample_t, make_sample, fill_cells, checksums_of, first_change
   use check_m, only: check
   implicit none
   private
@@ -19,51 +17,38 @@ contains
   subroutine test_state()
     call test_every_change_shows()
     call test_checksum_of_cells()
-    call test_finite()
     call test_owned_faces()
   end subroutine test_state
 
-  !> Change one number of each array in turn: the comparison names that array, the checksum differs,
-  !! and after the change is undone both agree again.
+  !> Change one number of each array in turn: that array has another checksum, none before it in the
+  !! list, and so has the state; after the change is undone both agree again.
   subroutine test_every_change_shows()
     type(sample_t) :: s
     integer, parameter :: n_changes = 35
     integer :: i
     character(:), allocatable :: name, before
-    type(image_visitor_t) :: image
+    character(18), allocatable :: each(:)
 
     call make_sample(0.5_wp, .false., s)
     before = checksum(s)
-    call look(image, s)
+    each = checksums_of(s)
     do i = 1, n_changes
       call change(s, i, name)
-      call image%compare()
-      call look(image, s)
-      if (.not. allocated(image%difference)) image%difference = 'nothing'
-      call check('a change of '//name//' is seen and named', index(image%difference, name) == 1)
+      call check('a change of '//name//' is seen and named', first_change(each, s) == name)
       call check('a change of '//name//' alters the checksum', checksum(s) /= before)
       call make_sample(0.5_wp, .false., s)
     end do
-    call image%compare()
-    call look(image, s)
-    call check('equal states are equal', .not. allocated(image%difference))
+    call check('equal states are equal', first_change(each, s) == 'nothing')
     call check('equal states have equal checksums', checksum(s) == before)
   end subroutine test_every_change_shows
-
-  subroutine look(image, s)
-    type(image_visitor_t), intent(inout) :: image
-    type(sample_t), intent(inout) :: s
-
-    call visit_state(image, s%run_state_t)
-  end subroutine look
 
   function checksum(s) result(text)
     type(sample_t), intent(inout) :: s
     character(:), allocatable :: text
-    type(checksum_visitor_t) :: visitor
+    type(state_list_t) :: list
 
-    call visit_state(visitor, s%run_state_t)
-    text = visitor%sum%text()
+    call list_state(s%run_state_t, list)
+    text = list%checksum()
   end function checksum
 
   !> Change number i of the list of all things that a run must remember.
@@ -76,19 +61,19 @@ contains
     at = s%grid%lo
     top = s%grid%hi
     select case (i)
-    case (1); name = '/clock/t '; s%clock%t = nearest(s%clock%t, 1.0_wp)
+    case (1); name = '/clock/t'; s%clock%t = nearest(s%clock%t, 1.0_wp)
     case (2); name = '/clock/dt'; s%clock%dt = nearest(s%clock%dt, 1.0_wp)
     case (3); name = '/clock/step'; s%clock%step = s%clock%step + 1
     case (4); name = '/clock/n_rows'; s%clock%n_rows = s%clock%n_rows + 1
     case (5); name = '/clock/n_frames'; s%clock%n_frames = s%clock%n_frames + 1
     case (6); name = '/clock/rest_began'; s%clock%rest_began = 0.0_wp
-    case (7); name = '/flow/u '; call touch(s%flow%u(at(1), at(2), at(3), 2))
-    case (8); name = '/flow/p '; call touch(s%flow%p(top(1), top(2), top(3)))
+    case (7); name = '/flow/u'; call touch(s%flow%u(at(1), at(2), at(3), 2))
+    case (8); name = '/flow/p'; call touch(s%flow%p(top(1), top(2), top(3)))
     case (9); name = '/flow/uf'; call touch(s%flow%uf(at(1) + 1, at(2), at(3), 3))
     case (10); name = '/flow/solid_flux'; call touch(s%flow%solid_flux(at(1), at(2), at(3), 1))
-    case (11); name = '/flow/liquid '; call touch(s%flow%liquid(at(1), at(2), at(3)))
+    case (11); name = '/flow/liquid'; call touch(s%flow%liquid(at(1), at(2), at(3)))
     case (12); name = '/flow/fluid_volume'; call touch(s%flow%fluid_volume(at(1), at(2), at(3)))
-    case (13); name = '/flow/c '; call touch(s%flow%c(at(1), at(2), at(3)))
+    case (13); name = '/flow/c'; call touch(s%flow%c(at(1), at(2), at(3)))
     case (14); name = '/flow/alpha'; call touch(s%solid%alpha(at(1), at(2), at(3)))
     case (15); name = '/flow/aperture'; call touch(s%solid%aperture(at(1), at(2), at(3), 2))
     case (16); name = '/flow/liquid_initial'; call touch(s%flow%liquid_initial)
@@ -97,8 +82,8 @@ contains
     case (19); name = '/blocks/release_time'; call touch(s%blocks%release_time(3))
     case (20); name = '/blocks/position'; call touch(s%blocks%x(3, 2))
     case (21); name = '/blocks/quaternion'; call touch(s%blocks%q(4, 2))
-    case (22); name = '/blocks/velocity '; call touch(s%blocks%v(1, 1))
-    case (23); name = '/blocks/angular_momentum '; s%blocks%l(3, 3) = 1.0_wp
+    case (22); name = '/blocks/velocity'; call touch(s%blocks%v(1, 1))
+    case (23); name = '/blocks/angular_momentum'; s%blocks%l(3, 3) = 1.0_wp
     case (24); name = '/blocks/fluid_force'; s%blocks%fluid_force(3, 3) = 1.0_wp
     case (25); name = '/blocks/contact_torque'; s%blocks%contact_torque(1, 3) = 1.0_wp
     case (26); name = '/blocks/on_floor'; s%blocks%on_floor(2) = 1
@@ -124,60 +109,40 @@ contains
   !> The sum over the blocks of all processes is the sum over the whole domain; exchanged elements
   !! show.
   subroutine test_checksum_of_cells()
-    type(sample_t) :: s
-    type(grid_t) :: whole
-    real(wp), allocatable :: a(:, :, :, :)
-    real(wp) :: kept
-    integer(i8) :: mine(2), all_cells(2), exchanged(2)
+    type(sample_t), target :: s
+    type(grid_t), target :: whole
+    type(state_list_t) :: list, of_whole
+    real(wp), allocatable, target :: a(:, :, :, :)
+    integer(i8) :: all_cells(2)
 
     call make_sample(0.0_wp, .false., s)
-    mine = checksum_of_cells(s%grid, .true., 3, s%flow%uf)
     whole = s%grid
     call whole%own([1, 1, 1], whole%n)
     allocate (a(whole%first(1):whole%last(1), whole%first(2):whole%last(2), &
                 whole%first(3):whole%last(3), 3))
     call fill_cells(0.3_wp, whole, 3, a)
-    all_cells = checksum_of_cells(whole, .true., 3, a)   ! every process adds all of it
-    call check('the checksum does not know the processes', all(mine*nproc() == all_cells))
-    kept = a(5, 4, 3, 1)
-    a(5, 4, 3, 1) = a(4, 5, 3, 1)
-    a(4, 5, 3, 1) = kept
-    exchanged = checksum_of_cells(whole, .true., 3, a)
-    call check('two elements exchanged alter the checksum', any(exchanged /= all_cells))
+    of_whole%grid => whole
+    call of_whole%add('uf', 'm/s', a, on_faces=.true.)
+    list%grid => s%grid
+    call list%add('uf', 'm/s', s%flow%uf, on_faces=.true.)
+    all_cells = checksum_of_cells(of_whole%item(1), whole)   ! every process adds all of it
+    call check('the checksum does not know the processes', &
+      all(checksum_of_cells(list%item(1), s%grid)*nproc() == all_cells))
+    a(4:5, 3:4, 3, 1) = transpose(a(4:5, 3:4, 3, 1))
+    call check('two elements exchanged alter the checksum', &
+      any(checksum_of_cells(of_whole%item(1), whole) /= all_cells))
   end subroutine test_checksum_of_cells
 
-  subroutine test_finite()
-    type(sample_t) :: s
-    type(finite_visitor_t) :: visitor, again, bodies
-
-    call make_sample(0.0_wp, .false., s)
-    call visit_state(visitor, s%run_state_t)
-    call check('a finite state is finite', .not. allocated(visitor%found))
-    if (all([3, 2, 17] >= s%grid%lo .and. [3, 2, 17] <= s%grid%hi)) then
-      s%flow%uf(3, 2, 17, 2) = ieee_value(1.0_wp, ieee_quiet_nan)
-    end if
-    call visit_state(again, s%run_state_t)
-    call check('a NaN of one process is found by all', &
-      again%found == '/flow/uf [m/s] at cell 3, 2, 17')
-    call make_sample(0.0_wp, .false., s)
-    s%blocks%v(2, 3) = ieee_value(1.0_wp, ieee_positive_inf)
-    call visit_state(bodies, s%run_state_t)
-    call check('an infinite speed is found', bodies%found == '/blocks/velocity [m/s] of number 3')
-  end subroutine test_finite
-
-  !> The parts of all processes cover every face of the domain once, and packing undoes unpacking.
+  !> The parts of all processes cover every face of the domain once.
   subroutine test_owned_faces()
-    type(sample_t) :: s
-    real(wp), allocatable :: row(:), again(:)
+    type(sample_t), target :: s
+    type(state_list_t) :: list
     integer :: first(3), last(3)
 
     call make_sample(0.0_wp, .false., s)
-    call owned_part(s%grid, .true., 3, first, last)
-    allocate (row(product(last - first + 1)), again(product(last - first + 1)))
-    call pack_part(s%grid, s%flow%p, first, last, row)
-    call unpack_part(s%grid, 2*row, first, last, s%flow%p)
-    call pack_part(s%grid, s%flow%p, first, last, again)
-    call check('what is packed is unpacked', again, 2*row, 0.0_wp)
+    list%grid => s%grid
+    call list%add('uf', 'm/s', s%flow%uf, on_faces=.true.)
+    call list%item(1)%part(s%grid, 3, first, last)
     call check('faces of z end at the upper side', last(3) == merge(s%grid%n(3) + 1, s%grid%hi(3), &
                s%grid%hi(3) == s%grid%n(3)) .and. last(1) == s%grid%hi(1) .or. my_rank() < 0)
   end subroutine test_owned_faces

@@ -1,0 +1,249 @@
+!> A list of the arrays that make up a state: names, units and pointers, for loops over all of them.
+module state_list_m
+  use, intrinsic :: iso_c_binding, only: c_loc, c_f_pointer
+  use kinds_m, only: wp, i8
+  use parallel_m, only: global_sum
+  use checksum_m, only: checksum_t
+  use grid_m, only: grid_t, unit_step
+  implicit none
+  private
+  public :: item_t, state_list_t, checksum_of_cells
+  public :: item_cells, item_reals, item_integers, item_logicals
+
+  integer, parameter :: item_cells = 1, item_reals = 2, item_integers = 3, item_logicals = 4
+  integer, parameter :: max_items = 100
+
+  !> An array of the state. Cells are those of this process, with halo; all else is the same on all
+  !! processes. The pointers hold as long as the arrays keep their place.
+  type :: item_t
+    character(:), allocatable :: name, units   !! name with its group
+    integer :: kind = 0                        !! `item_cells`, ...: which pointer is set
+    logical :: on_faces = .false.              !! component d lives on lower faces of direction d
+    integer, allocatable :: extent(:)          !! of the whole array
+    real(wp), pointer, contiguous :: cells(:, :, :, :) => null()   !! (i, j, k, component)
+    real(wp), pointer, contiguous :: reals(:) => null()            !! any rank, elements in a row
+    integer, pointer, contiguous :: integers(:) => null()
+    logical, pointer, contiguous :: logicals(:) => null()
+  contains
+    procedure :: part => owned_part
+    procedure :: numbers
+    procedure :: add_to_checksum
+  end type item_t
+
+  type :: state_list_t
+    type(grid_t), pointer :: grid => null()
+    integer :: n = 0
+    type(item_t) :: item(max_items)
+  contains
+    procedure, private :: add_scalar_field, add_vector_field, add_number, add_reals, add_matrix
+    procedure, private :: add_whole_number, add_integers, add_logicals, begin
+    generic :: add => add_scalar_field, add_vector_field, add_number, add_reals, add_matrix, &
+      add_whole_number, add_integers, add_logicals
+    procedure :: checksum, bytes
+  end type state_list_t
+
+contains
+
+  !> A cell array without components.
+  subroutine add_scalar_field(self, name, units, a)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: a(:, :, :)   !! with halo
+
+    call self%begin(name, units, item_cells, [self%grid%n, 1])
+    associate (item => self%item(self%n), first => self%grid%first, last => self%grid%last)
+      item%cells(first(1):last(1), first(2):last(2), first(3):last(3), 1:1) => a
+    end associate
+  end subroutine add_scalar_field
+
+  !> Three components of cells, or of faces: those of all directions are stored up to n + 1.
+  subroutine add_vector_field(self, name, units, a, on_faces)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: a(:, :, :, :)   !! with halo
+    logical, intent(in) :: on_faces
+
+    call self%begin(name, units, item_cells, [self%grid%n + merge(1, 0, on_faces), size(a, 4)])
+    associate (item => self%item(self%n), first => self%grid%first)
+      item%on_faces = on_faces
+      item%cells(first(1):, first(2):, first(3):, 1:) => a
+    end associate
+  end subroutine add_vector_field
+
+  subroutine add_number(self, name, units, x)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target :: x
+
+    call self%begin(name, units, item_reals, [1])
+    call c_f_pointer(c_loc(x), self%item(self%n)%reals, [1])
+  end subroutine add_number
+
+  subroutine add_reals(self, name, units, a)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: a(:)
+
+    call self%begin(name, units, item_reals, shape(a))
+    self%item(self%n)%reals => a
+  end subroutine add_reals
+
+  subroutine add_matrix(self, name, units, a)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: a(:, :)
+
+    call self%begin(name, units, item_reals, shape(a))
+    self%item(self%n)%reals(1:size(a)) => a
+  end subroutine add_matrix
+
+  subroutine add_whole_number(self, name, i)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in), target :: i
+
+    call self%begin(name, '', item_integers, [1])
+    call c_f_pointer(c_loc(i), self%item(self%n)%integers, [1])
+  end subroutine add_whole_number
+
+  subroutine add_integers(self, name, a)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in), target, contiguous :: a(:)
+
+    call self%begin(name, '', item_integers, shape(a))
+    self%item(self%n)%integers => a
+  end subroutine add_integers
+
+  !> Stored as 0 and 1.
+  subroutine add_logicals(self, name, a)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    logical, intent(in), target, contiguous :: a(:)
+
+    call self%begin(name, '', item_logicals, shape(a))
+    self%item(self%n)%logicals => a
+  end subroutine add_logicals
+
+  !> One more item, whose pointer is to be set.
+  subroutine begin(self, name, units, kind, extent)
+    class(state_list_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: kind, extent(:)
+
+    if (self%n == max_items) error stop 'state_list: max_items is too small'
+    self%n = self%n + 1
+    associate (item => self%item(self%n))
+      item%name = name
+      item%units = units
+      item%kind = kind
+      item%extent = extent
+    end associate
+  end subroutine begin
+
+  !> The cells, or lower faces of direction d, that this process answers for: its own, and the upper
+  !! side of the domain if it touches it. Every face of the domain belongs to one process.
+  pure subroutine owned_part(self, grid, d, first, last)
+    class(item_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d
+    integer, intent(out) :: first(3), last(3)   !! global index
+
+    first = grid%lo
+    last = grid%hi
+    if (self%on_faces .and. grid%hi(d) == grid%n(d)) last = last + unit_step(:, d)
+  end subroutine owned_part
+
+  !> Integers, or logicals as 0 and 1.
+  pure function numbers(self) result(a)
+    class(item_t), intent(in) :: self
+    integer :: a(product(self%extent))
+
+    if (self%kind == item_integers) a = self%integers
+    if (self%kind == item_logicals) a = merge(1, 0, self%logicals)
+  end function numbers
+
+  !> Checksum of the whole state, the same on any number of processes.
+  function checksum(self) result(text)
+    class(state_list_t), intent(in) :: self
+    character(:), allocatable :: text
+    type(checksum_t) :: sum
+    integer :: i
+
+    do i = 1, self%n
+      call self%item(i)%add_to_checksum(self%grid, sum)
+    end do
+    text = sum%text()
+  end function checksum
+
+  !> Add an item to a checksum; all processes call.
+  subroutine add_to_checksum(self, grid, sum)
+    class(item_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    type(checksum_t), intent(inout) :: sum
+
+    call sum%add_text(self%name//self%units)
+    select case (self%kind)
+    case (item_cells)
+      call sum%add_integers(4, transfer(checksum_of_cells(self, grid), [0]))
+    case (item_reals)
+      call sum%add_reals(size(self%reals), self%reals)
+    case default
+      call sum%add_integers(product(self%extent), self%numbers())
+    end select
+  end subroutine add_to_checksum
+
+  !> Two sums over all processes of scrambled bits, each element with its own place in it, so that
+  !! the order of summation does not matter but the place of every element does.
+  function checksum_of_cells(item, grid) result(halves)
+    type(item_t), intent(in) :: item
+    type(grid_t), intent(in) :: grid
+    integer(i8) :: halves(2)   !! of the lower and the upper 32 bits
+    integer(i8), parameter :: lower_half = 2_i8**32 - 1_i8
+    integer(i8) :: place, bits
+    integer :: first(3), last(3), d, i, j, k
+
+    halves = 0
+    do d = 1, size(item%cells, 4)
+      call item%part(grid, d, first, last)
+      do k = first(3), last(3)
+        do j = first(2), last(2)
+          place = ((int(d, i8)*(grid%n(3) + 2) + k)*(grid%n(2) + 2) + j)*(grid%n(1) + 2)
+          do i = first(1), last(1)
+            bits = scrambled(ieor(transfer(item%cells(i, j, k, d), bits), scrambled(place + i)))
+            halves(1) = halves(1) + iand(bits, lower_half)
+            halves(2) = halves(2) + ishft(bits, -32)
+          end do
+        end do
+      end do
+    end do
+    call global_sum(halves)
+  end function checksum_of_cells
+
+  !> Spread a change of one bit over many; different bits stay different.
+  elemental function scrambled(bits) result(b)
+    integer(i8), intent(in) :: bits
+    integer(i8) :: b
+
+    b = ieor(bits, ishft(bits, 13))
+    b = ieor(b, ishft(b, -7))
+    b = ieor(b, ishft(b, 17))
+  end function scrambled
+
+  !> Bytes that the whole state takes in a file, at most.
+  pure function bytes(self) result(n)
+    class(state_list_t), intent(in) :: self
+    integer(i8) :: n
+    integer, parameter :: header = 1024   !! what HDF5 keeps about an item, generously [bytes]
+    integer :: i
+
+    n = 0
+    do i = 1, self%n
+      associate (item => self%item(i))
+        n = n + header + len(item%name//item%units) + product(int(item%extent, i8)) &
+          *merge(8, 4, item%kind == item_cells .or. item%kind == item_reals)
+      end associate
+    end do
+  end function bytes
+
+end module state_list_m
