@@ -2,46 +2,50 @@
 module test_contacts_m
   use kinds_m, only: wp, pi
   use check_m, only: check, checked
-  use case_types_m, only: case_t, body_input_t
+  use errors_m, only: to_text
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use vectors_m, only: cross, quaternion_from_axis
   use random_counter_m, only: uniform, random_rotation
-  use rigid_body_m, only: blocks_t, blocks_init, kinetic_energy, potential_energy, release_body
-  use walls_m, only: walls_t, walls_init
+  use rigid_body_m, only: blocks_t, kinetic_energy, release_body
   use law_restitution_m, only: min_restitution
-  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use contacts_m, only: contacts_init
+  use world_m, only: world_t, set_up, begin, body, move
   implicit none
   private
   public :: test_contacts
-
-  !> A small world of its own.
-  type :: world_t
-    type(case_t) :: case
-    real(wp) :: gravity(3) = 0.0_wp
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-    type(contact_report_t) :: report
-  end type world_t
 
   real(wp), parameter :: d = 0.02_wp         !! diameter of the ball, edge of the cube [m]
   real(wp), parameter :: g = 9.81_wp         !! [m/s2]
   real(wp), parameter :: dt = 2.0e-3_wp   !! twenty substeps of a twentieth of the contact time [s]
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  real(wp), parameter :: middle(3) = 0.5_wp, up(3) = [0.0_wp, 0.0_wp, 1.0_wp]   !! of the tank [m]
+  character(*), parameter :: smooth = 'friction=0 wall_friction=0 restitution='
+  character(*), parameter :: tank = '&grid cells=3*2 length=3*1/ '
+  character(*), parameter :: space = tank//'&fluid gravity=3*0/ '
+  character(*), parameter :: ball = '&shape name="ball" kind="sphere" size=.02 refinement=1/ '
+  character(*), parameter :: cube = '&shape name="cube" kind="cube" size=.02 refinement=2/ '
+  character(*), parameter :: slab = '&shape name="slab" kind="box" size=.12,.12,.02 refinement=2/ '
   character(*), parameter :: models(3) = [character(7) :: 'spheres', 'surface', 'surface']
   character(*), parameter :: solvers(3) = [character(8) :: 'springs', 'springs', 'impulses']
-  type(shape_t), allocatable :: shapes(:)
   integer :: model
 
 contains
 
   subroutine test_contacts()
-    call make_shapes()
     do model = 1, 3
       call check_model()
     end do
   end subroutine test_contacts
+
+  !> Set up other groups with this &contact for the model, without sleep (see test_sleep).
+  subroutine start(contact, groups, world)
+    character(*), intent(in) :: contact, groups
+    type(world_t), intent(out) :: world
+
+    call set_up('&run t_end=1 physics="dry"/ &contact model="'//trim(models(model))//'" solver="' &
+      //trim(solvers(model))//'" '//contact//merge('         ', ' sleep=F ', &
+      index(contact, 'sleep') > 0)//'/ '//groups, world)
+  end subroutine start
 
   !> Everything, for one of the two models, or for impulses.
   subroutine check_model()
@@ -51,10 +55,7 @@ contains
     call check_colliding_balls()
     call check_landing_cube()
     call check_landing_slab()
-    if (models(model) == 'surface') call check_edge_on_edge()
     if (solvers(model) == 'springs') call check_swinging_ball()
-    call check_slip_to_roll()
-    call check_incline()
     call check_incline_on_body()
     call check_stack()
     call check_momentum()
@@ -67,69 +68,6 @@ contains
     call check_runaway()
   end subroutine check_model
 
-  subroutine make_shapes()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(5), shapes(5))
-    case%shape%name = [character(8) :: 'ball', 'cube', 'plain', 'hexapod', 'slab']
-    case%shape%kind = [character(8) :: 'sphere', 'cube', 'cube', 'hexapod', 'box']
-    case%shape%refinement = [1, 2, 1, 1, 2]
-    do s = 1, 5
-      case%shape(s)%size = d
-      if (s == 5) case%shape(s)%size = [6*d, 6*d, d]
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-  end subroutine make_shapes
-
-  !> A tank of 1 m with n bodies of a shape, all in the middle at rest, no friction.
-  subroutine new_world(world, n, shape)
-    type(world_t), intent(out) :: world
-    integer, intent(in) :: n
-    character(*), intent(in) :: shape
-    integer :: b
-
-    allocate (world%case%body(n), world%case%drop(0))
-    world%case%grid%length = 1.0_wp
-    world%case%contact%model = models(model)
-    world%case%contact%solver = solvers(model)
-    world%case%contact%friction = 0.0_wp
-    world%case%contact%wall_friction = 0.0_wp
-    world%case%contact%sleep = .false.   ! see test_sleep
-    do b = 1, n
-      world%case%body(b)%shape = shape
-      world%case%body(b)%position = 0.5_wp
-    end do
-  end subroutine new_world
-
-  !> Make the bodies, walls and contacts of the case, with the shapes that it uses.
-  subroutine start(world)
-    type(world_t), intent(inout) :: world
-    integer :: s
-
-    call blocks_init(world%case, shapes(pack([1, 2, 3, 4, 5], [(any(world%case%body%shape &
-      == shapes(s)%name), s=1, 5)])), world%blocks)
-    call walls_init(world%case%grid, world%case%boundary, world%walls)
-    call contacts_init(world%case%contact, world%blocks, world%contacts)
-  end subroutine start
-
-  !> Take n steps.
-  subroutine run(world, n, step)
-    type(world_t), intent(inout) :: world
-    integer, intent(in) :: n
-    real(wp), intent(in), optional :: step   !! [s]; else dt
-    real(wp) :: step_now
-    integer :: i
-
-    step_now = dt
-    if (present(step)) step_now = step
-    do i = 1, n
-      call move_blocks(world%walls, world%gravity, step_now, world%contacts, world%blocks, &
-        world%report)
-    end do
-  end subroutine run
-
   !> The restitution asked for, whatever part of a substep the impact begins in; and its duration.
   subroutine check_bouncing_ball()
     real(wp), parameter :: e(7) = [0.0_wp, 0.02_wp, 0.1_wp, 0.3_wp, 0.5_wp, 0.7_wp, 0.9_wp]
@@ -140,13 +78,9 @@ contains
     do m = 1, size(e)
       worst = 0.0_wp
       do phase = 0, 9
-        call new_world(world, 1, 'ball')
-        world%case%contact%restitution = e(m)
-        world%case%body(1)%position(3) = 0.5_wp*d &
-          + 0.8_wp*(1.0_wp + 0.1_wp*real(phase, wp))*1.0e-4_wp
-        world%case%body(1)%velocity(3) = -0.8_wp
-        call start(world)
-        call run(world, 4)
+        call start(smooth//to_text(e(m)), space//ball//body('ball', [0.5_wp, 0.5_wp, 0.5_wp*d &
+          + 0.8_wp*(1.0_wp + 0.1_wp*real(phase, wp))*1.0e-4_wp], -0.8_wp*up), world)
+        call move(world, 4, dt)
         worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - merge( &
           max(e(m), min_restitution), e(m), solvers(model) == 'springs')))
       end do
@@ -154,13 +88,11 @@ contains
       call check('no spin', maxval(abs(world%blocks%omega)), 0.0_wp, 0.0_wp)
     end do
     if (solvers(model) == 'impulses') return
-    call new_world(world, 1, 'ball')
-    world%case%body(1)%position(3) = 0.5_wp*d
-    world%case%body(1)%velocity(3) = -0.8_wp
-    call start(world)
+    call start(smooth//'.3', space//ball//body('ball', [0.5_wp, 0.5_wp, 0.5_wp*d], -0.8_wp*up), &
+      world)
     duration = 0.0_wp
     do while (world%blocks%v(3, 1) < 0.2999_wp*0.8_wp .and. duration < 0.1_wp)
-      call run(world, 1, 2.0e-5_wp)
+      call move(world, 1, 2.0e-5_wp)
       duration = duration + 2.0e-5_wp
     end do
     call check('duration of the impact', duration, world%case%contact%contact_time, 1.0e-4_wp)
@@ -179,15 +111,11 @@ contains
         worst = 0.0_wp
         deepest = 0.0_wp
         do phase = 0, 4
-          call new_world(world, 1, kind(s))
-          world%case%contact%restitution = e(m)
-          world%case%body(1)%position(3) = 0.5_wp*d + 1.0e-3_wp + 1.0e-4_wp*real(phase, wp)
-          world%case%body(1)%velocity(3) = -speed
-          call start(world)
-          world%gravity = 0.0_wp
+          call start(smooth//to_text(e(m)), space//ball//cube//body(kind(s), &
+            [0.5_wp, 0.5_wp, 0.5_wp*d + 1.0e-3_wp + 1.0e-4_wp*real(phase, wp)], -speed*up), world)
           do i = 1, 4
-            call run(world, 1)
-            deepest = max(deepest, world%report%overlap_max)
+            call move(world, 1, dt)
+            deepest = max(deepest, world%contact%overlap_max)
           end do
           worst = max(worst, abs(world%blocks%v(3, 1)/speed - e(m)))
         end do
@@ -203,13 +131,10 @@ contains
     type(world_t) :: world
     real(wp) :: impulse, weight
 
-    call new_world(world, 1, 'ball')
-    world%case%contact%restitution = 0.9_wp
-    world%case%body(1)%position(3) = 0.5_wp*d + 1.0e-4_wp
-    world%case%body(1)%velocity(3) = -0.8_wp
-    call start(world)
+    call start(smooth//'.9', space//ball//body('ball', [0.5_wp, 0.5_wp, 0.5_wp*d + 1.0e-4_wp], &
+      -0.8_wp*up), world)
     world%blocks%added_mass(1) = 0.25_wp*world%blocks%mass(1)
-    call run(world, 1, 4.0e-3_wp)
+    call move(world, 1, 4.0e-3_wp)
     call check('restitution with added mass', world%blocks%v(3, 1)/0.8_wp, 0.9_wp, 0.01_wp)
     impulse = world%blocks%contact_force(3, 1)*4.0e-3_wp
     call check('impulse on ball and fluid', impulse, 1.25_wp*world%blocks%mass(1) &
@@ -218,8 +143,8 @@ contains
     world%blocks%x(3, 1) = 0.5_wp
     world%blocks%v = 0.0_wp
     world%blocks%contact_force(:, 1) = [0.0_wp, 0.0_wp, weight]
-    world%gravity = [0.0_wp, 0.0_wp, -g]
-    call run(world, 1)
+    world%case%fluid%gravity = -g*up
+    call move(world, 1, dt)
     call check('what the fluid took of the last force', world%blocks%v(3, 1), -dt*g/1.25_wp, &
                1.0e-12_wp)
   end subroutine check_added_mass
@@ -232,18 +157,14 @@ contains
     integer :: m
 
     do m = 1, size(e)
-      call new_world(world, 2, 'ball')
-      world%case%contact%restitution = e(m)
       n = [0.6_wp, 0.0_wp, 0.8_wp]
-      world%case%body(2)%position = 0.5_wp + 1.001_wp*d*n
-      world%case%body(1)%velocity = [0.0_wp, 0.1_wp, 0.9_wp]
-      world%case%body(2)%velocity = [0.0_wp, 0.0_wp, -0.3_wp]
-      call start(world)
+      call start(smooth//to_text(e(m)), space//ball//body('ball', middle, [0.0_wp, 0.1_wp, 0.9_wp]) &
+        //body('ball', middle + 1.001_wp*d*n, -0.3_wp*up), world)
       before = dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n)
-      call run(world, 1)
+      call move(world, 1, dt)
       if (solvers(model) == 'springs') n = world%blocks%x(:, 2) - world%blocks%x(:, 1)
         ! has hardly turned; impulses are those of where they stood
-      call run(world, 3)
+      call move(world, 3, dt)
       after = dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n/norm2(n))
       call check('restitution of two balls', -after/before, e(m), 0.02_wp)
     end do
@@ -264,14 +185,11 @@ contains
       do m = 1, size(e)
         worst = 0.0_wp
         do phase = 0, 4
-          call new_world(world, 1, 'cube')
-          world%case%contact%restitution = e(m)
-          world%case%body(1)%quaternion = q(:, pose)
-          world%case%body(1)%velocity(3) = -0.8_wp
-          world%case%body(1)%position(3) = lowest(shapes(2), q(:, pose)) + 1.0e-4_wp &
+          call start(smooth//to_text(e(m)), space//cube//body('cube', middle, -0.8_wp*up, &
+            q(:, pose)), world)
+          world%blocks%x(3, 1) = lowest(world%shapes(1), q(:, pose)) + 1.0e-4_wp &
             + 2.0e-5_wp*real(phase, wp)
-          call start(world)
-          call run(world, 8)
+          call move(world, 8, dt)
           worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - e(m)))
         end do
         call check('restitution of a cube', worst, 0.0_wp, 0.02_wp)
@@ -289,63 +207,25 @@ contains
     worst = 0.0_wp
     turned = 0.0_wp
     do phase = 0, 3
-      call new_world(world, 1, 'slab')
-      world%case%body(1)%angular_velocity(3) = 5.0_wp
       e = merge(0.9_wp, 0.5_wp, phase < 2)
-      world%case%contact%restitution = e
-      world%case%body(1)%velocity(3) = -0.8_wp
-      world%case%body(1)%position(3) = lowest(shapes(5), upright) &
-        + 1.0e-4_wp*(1.0_wp + 0.3_wp*phase)
-      call start(world)
-      call run(world, 4)
+      call start(smooth//to_text(e), space//slab//body('slab', middle, -0.8_wp*up, &
+        more='angular_velocity=0,0,5'), world)
+      world%blocks%x(3, 1) = lowest(world%shapes(1), upright) + 1.0e-4_wp*(1.0_wp + 0.3_wp*phase)
+      call move(world, 4, dt)
       worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - e))
       turned = max(turned, abs(2*atan2(world%blocks%q(4, 1), world%blocks%q(1, 1)) - 20*dt))
     end do
     call check('restitution of a slab', worst, 0.0_wp, 0.03_wp)
     call check('it goes on turning meanwhile', turned, 0.0_wp, 1.0e-9_wp)
     if (solvers(model) == 'impulses') return
-    call new_world(world, 1, 'ball')
-    world%case%contact%law = 'constants'   ! t_c = 0.05 ms, not told by contact_time
-    world%case%contact%k_n = 4.0e7_wp
-    world%case%contact%eta_n = 0.0_wp
-    world%case%body(1)%position(3) = 0.5_wp*d + 1.3e-4_wp
-    world%case%body(1)%velocity(3) = -0.8_wp
-    call start(world)
+    ! t_c = 0.05 ms, not told by contact_time
+    call start('law="constants" k_n=4e7 eta_n=0 friction=0 wall_friction=0', space//ball &
+      //body('ball', [0.5_wp, 0.5_wp, 0.5_wp*d + 1.3e-4_wp], -0.8_wp*up), world)
     first = kinetic_energy(world%blocks)
-    call run(world, 1)
+    call move(world, 1, dt)
     call check('a stiff spring gives the energy back', kinetic_energy(world%blocks)/first, 1.0_wp, &
       0.05_wp)
   end subroutine check_landing_slab
-
-  !> Edges that meet exactly along one another touch along oblique normals with weights that change
-  !! with position: the pair still returns what is asked for, and makes no energy.
-  subroutine check_edge_on_edge()
-    real(wp), parameter :: e(4) = [0.1_wp, 0.3_wp, 0.7_wp, 1.0_wp]
-    type(world_t) :: world
-    real(wp) :: worst
-    integer :: m, k, phase
-
-    do m = 1, size(e)
-      worst = 0.0_wp
-      do phase = 0, 2
-        call new_world(world, 2, 'cube')
-        world%case%contact%restitution = e(m)
-        do k = 1, 2
-          world%case%body(k)%quaternion = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], &
-            atan(1.0_wp))
-          world%case%body(k)%velocity(3) = merge(0.4_wp, -0.4_wp, k == 1)
-        end do
-        world%case%body(2)%position(3) = 0.5_wp + sqrt(2.0_wp)*d + 1.0e-4_wp &
-          + 3.0e-5_wp*real(phase, wp)
-        call start(world)
-        world%gravity = 0.0_wp
-        call run(world, 8)
-        worst = max(worst, abs((world%blocks%v(3, 2) - world%blocks%v(3, 1))/0.8_wp - e(m)))
-        call check('no turn of edges', maxval(abs(world%blocks%omega)), 0.0_wp, 1.0e-9_wp)
-      end do
-      call check('restitution of edge on edge', worst, 0.0_wp, 0.02_wp)
-    end do
-  end subroutine check_edge_on_edge
 
   !> Height of the centre at which the lowest contact sphere or corner of a shape stands on the
   !! floor [m].
@@ -379,75 +259,18 @@ contains
     type(world_t) :: world
     real(wp) :: slip, energy
 
-    call new_world(world, 1, 'ball')
-    world%case%contact%restitution = 1.0_wp
-    world%case%contact%wall_friction = 0.4_wp
-    world%gravity(3) = -g
-    world%case%body(1)%position(3) = 0.5_wp*d - g*(world%case%contact%contact_time/pi)**2
-    world%case%body(1)%velocity(1) = nudge
-    call start(world)
+    call start('restitution=1', tank//ball//body('ball', middle, [nudge, 0.0_wp, 0.0_wp]), world)
+    world%blocks%x(3, 1) = 0.5_wp*d - g*(world%case%contact%contact_time/pi)**2
     energy = kinetic_energy(world%blocks)
-    call run(world, 1)
+    call move(world, 1, dt)
     slip = world%blocks%v(1, 1) - 0.5_wp*d*world%blocks%omega(2, 1)
     call check('swings back', slip, -nudge, 0.01_wp*nudge)
     call check('rolls on meanwhile', world%blocks%v(1, 1), 3*nudge/7, 0.01_wp*nudge)
-    call run(world, 1, 1.25_wp*dt)
-    call check('energy while swinging', kinetic_energy(world%blocks) + world%report%energy &
+    call move(world, 1, 1.25_wp*dt)
+    call check('energy while swinging', kinetic_energy(world%blocks) + world%contact%energy &
       - 0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, &
       0.01_wp*energy)
   end subroutine check_swinging_ball
-
-  !> A ball set down sliding ends rolling at 5/7 of its speed after 2 v/(7 mu g).
-  subroutine check_slip_to_roll()
-    real(wp), parameter :: v = 0.5_wp, mu = 0.3_wp
-    type(world_t) :: world
-    real(wp) :: rolling
-
-    call new_world(world, 1, 'ball')
-    world%case%contact%wall_friction = mu
-    world%gravity(3) = -g
-    world%case%body(1)%position = [0.3_wp, 0.5_wp, 0.5_wp*d]
-    world%case%body(1)%velocity(1) = v
-    call start(world)
-    rolling = 2*v/(7*mu*g)
-    call run(world, nint(0.5_wp*rolling/dt))
-    call check('slows down by mu g', world%blocks%v(1, 1), &
-      v - mu*g*dt*real(nint(0.5_wp*rolling/dt), wp), 0.01_wp*v)
-    call run(world, nint(1.0_wp*rolling/dt))
-    call check('rolls at 5/7', world%blocks%v(1, 1), 5*v/7, 0.002_wp*v)
-    call check('without slip', world%blocks%omega(2, 1)*0.5_wp*d, world%blocks%v(1, 1), 0.002_wp*v)
-    call check('in a line', maxval(abs(world%blocks%v(2:3, 1))), 0.0_wp, 1.0e-10_wp)
-    call run(world, 50)
-    call check('and goes on', world%blocks%v(1, 1), 5*v/7, 0.002_wp*v)
-  end subroutine check_slip_to_roll
-
-  !> A cube on a slope of the floor: stays below the angle of friction, and slides as it should
-  !! above.
-  subroutine check_incline()
-    real(wp), parameter :: mu = 0.4_wp
-    type(world_t) :: world
-    real(wp) :: slope, x(3), v
-
-    slope = 0.95_wp*atan(mu)
-    call new_world(world, 1, 'cube')
-    world%case%contact%wall_friction = mu
-    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    world%case%body(1)%position(3) = lowest(shapes(2), upright)
-    call start(world)
-    call run(world, 200)
-    x = world%blocks%x(:, 1)
-    call run(world, 100)
-    call check('does not creep', maxval(abs(world%blocks%x(:, 1) - x)), 0.0_wp, &
-      merge(1.0e-12_wp, 1.0e-10_wp, solvers(model) == 'springs'))
-    call check('friction holds the weight', world%blocks%contact_force(1, 1), &
-      -world%blocks%mass(1)*g*sin(slope), merge(1.0e-9_wp, 1.0e-7_wp, solvers(model) == 'springs'))
-    slope = 1.5_wp*atan(mu)
-    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    call run(world, 50)
-    v = world%blocks%v(1, 1)
-    call run(world, 50)
-    call check('slides', world%blocks%v(1, 1) - v, 50*dt*g*(sin(slope) - mu*cos(slope)), 1.0e-3_wp)
-  end subroutine check_incline
 
   !> The same on a fixed body, spheres on spheres.
   subroutine check_incline_on_body()
@@ -455,21 +278,17 @@ contains
     real(wp) :: slope, x(3)
 
     slope = 0.3_wp
-    call new_world(world, 2, 'cube')
-    world%case%contact%friction = 0.6_wp
-    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    world%case%body(1)%shape = 'slab'
-    world%case%body(1)%fixed = .true.
-    world%case%body(2)%position = [0.503_wp, 0.501_wp, 0.5_wp + 1.2_wp*d]
-    call start(world)
-    call run(world, 500)
+    call start('friction=.6', tank//cube//slab//body('slab', middle, more='fixed=T') &
+      //body('cube', [0.503_wp, 0.501_wp, 0.5_wp + 1.2_wp*d]), world)
+    world%case%fluid%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
+    call move(world, 500, dt)
     call check('lies on the slab', world%blocks%contacts(2), 1)
     x = world%blocks%x(:, 2)
-    call run(world, 250)
+    call move(world, 250, dt)
     call check('does not creep on spheres', maxval(abs(world%blocks%x(:, 2) - x)), 0.0_wp, &
       1.0e-9_wp)
     call check('the slab bears the cube', maxval(abs(world%blocks%contact_force(:, 1) &
-      - world%blocks%mass(2)*world%gravity)), 0.0_wp, 1.0e-4_wp)
+      - world%blocks%mass(2)*world%case%fluid%gravity)), 0.0_wp, 1.0e-4_wp)
     call check('action and reaction', maxval(abs(sum(world%blocks%contact_force, 2))), 0.0_wp, &
       0.0_wp)
   end subroutine check_incline_on_body
@@ -478,25 +297,19 @@ contains
   !! weight.
   subroutine check_stack()
     type(world_t) :: world
-    real(wp) :: height, change(3, 2), weight, v(3, 2)
+    real(wp) :: change(3, 2), weight, v(3, 2)
 
-    call new_world(world, 2, 'cube')
-    world%case%contact%friction = 0.6_wp
-    world%case%contact%wall_friction = 0.4_wp
-    world%gravity(3) = -g
-    height = lowest(shapes(2), upright)
-    world%case%body(1)%position(3) = height
-    world%case%body(2)%position(3) = 3*height
-    call start(world)
-    call run(world, 10)
+    call start('friction=.6', tank//cube//body('cube', middle)//body('cube', middle), world)
+    world%blocks%x(3, :) = [1, 3]*lowest(world%shapes(1), upright)
+    call move(world, 10, dt)
     v = world%blocks%v
-    call run(world, 1)
+    call move(world, 1, dt)
     weight = g*world%blocks%mass(1)
     change = world%blocks%mass(1)*(world%blocks%v - v)/dt
     change(3, :) = change(3, :) + weight
     call check('M dU/dt = contact + M g', maxval(abs(change - world%blocks%contact_force)), &
       0.0_wp, 1.0e-12_wp)
-    call run(world, 500)
+    call move(world, 500, dt)
     call check('at rest', maxval(abs(world%blocks%v)), 0.0_wp, &
       merge(1.0e-9_wp, 1.0e-8_wp, solvers(model) == 'springs'))
     call check('on the floor', all(world%blocks%on_floor == [1, 0]))
@@ -505,32 +318,30 @@ contains
       1.0e-8_wp)
     call check('no torque', maxval(abs(world%blocks%contact_torque)), 0.0_wp, 1.0e-10_wp)
     if (solvers(model) == 'springs') call check('energy of the springs', &
-      world%report%energy > 0.0_wp)
+      world%contact%energy > 0.0_wp)
     call check('upright', abs(world%blocks%q(1, 2)), 1.0_wp, 1.0e-6_wp)
   end subroutine check_stack
 
   !> Momentum and angular momentum of colliding bodies, with friction and damping, no walls near.
   subroutine check_momentum()
     type(world_t) :: world
-    real(wp) :: p(3), l(3), p0(3), l0(3), round_off
+    real(wp) :: p(3), l(3), p0(3), l0(3), place(3), round_off
+    character(:), allocatable :: bodies
     integer :: b, i, drifts
 
-    call new_world(world, 4, 'hexapod')
-    world%case%contact%friction = 0.6_wp
+    bodies = ''
     do b = 1, 4
-      world%case%body(b)%position = 0.45_wp + 0.08_wp*real([mod(b, 2), b/2, 0], wp)
-      world%case%body(b)%quaternion = random_rotation(1, b)
-      world%case%body(b)%velocity = 0.8_wp*(0.5_wp &
-        - (world%case%body(b)%position - 0.45_wp)/0.08_wp)
-      world%case%body(b)%angular_velocity = 10*[uniform(1, b, 11), uniform(1, b, 12), &
-        uniform(1, b, 13)]
+      place = real([mod(b, 2), b/2, 0], wp)
+      bodies = bodies//body('hexapod', 0.45_wp + 0.08_wp*place, 0.8_wp*(0.5_wp - place), &
+        random_rotation(1, b), spin(b, 10.0_wp))
     end do
-    call start(world)
+    call start('friction=.6', space//'&shape name="hexapod" kind="hexapod" size=.02/ '//bodies, &
+      world)
     call total(world%blocks, p0, l0)
     drifts = 0
     do i = 1, 60
-      call run(world, 1)
-      drifts = drifts + 2*world%report%substeps
+      call move(world, 1, dt)
+      drifts = drifts + 2*world%contact%substeps
     end do
     call total(world%blocks, p, l)
     ! each drift rounds the places, by the same amount while nothing touches
@@ -542,6 +353,16 @@ contains
     call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, round_off)
     call check('to round-off', round_off < 1.0e-12_wp)
   end subroutine check_momentum
+
+  !> The angular velocity of a body by chance, up to `most`.
+  function spin(b, most) result(text)
+    integer, intent(in) :: b
+    real(wp), intent(in) :: most   !! [rad/s]
+    character(:), allocatable :: text
+
+    text = 'angular_velocity='//to_text(most*[uniform(1, b, 11), uniform(1, b, 12), &
+      uniform(1, b, 13)])
+  end function spin
 
   !> Momentum of all bodies, and angular momentum about the middle of the tank.
   pure subroutine total(blocks, p, l)
@@ -560,6 +381,8 @@ contains
   !> Without damping and friction the energy comes back; with friction none is made.
   subroutine check_energy()
     real(wp), parameter :: mu(2) = [0.0_wp, 0.5_wp]
+    character(*), parameter :: finer(3) = [character(35) :: ' restitution=1 substep_ratio=.01', &
+      ' restitution=1 substep_ratio=.001', ' restitution=.6']
     type(world_t) :: world
     real(wp) :: energy, least, most, now, band
     integer :: i, m, n
@@ -570,24 +393,15 @@ contains
       least = 1.0_wp
       most = 0.0_wp
       do i = 1, merge(3, 12, checked)
-        call new_world(world, 2, 'cube')
-        world%case%contact%restitution = merge(1.0_wp, 0.6_wp, solvers(model) == 'springs')
-        world%case%contact%wall_friction = mu(m)
-        world%case%contact%friction = mu(m)
-        world%case%contact%substep_ratio = merge(0.001_wp, 0.01_wp, models(model) == 'surface')
-        world%case%body(1)%position(3) = 0.03_wp
-        world%case%body(2)%position(2:3) = [0.49_wp, 0.066_wp]
-        world%case%body(1)%quaternion = random_rotation(2, i)
-        world%case%body(2)%quaternion = random_rotation(3, i)
-        world%case%body(1)%velocity(3) = -0.5_wp
-        world%case%body(2)%velocity(3) = -0.8_wp
-        world%case%body(1)%angular_velocity = 15*[uniform(1, i, 11), uniform(1, i, 12), &
-          uniform(1, i, 13)]
-        call start(world)
+        call start('friction='//to_text(mu(m))//' wall_friction='//to_text(mu(m)) &
+          //trim(finer(model)), space//cube &
+          //body('cube', [0.5_wp, 0.5_wp, 0.03_wp], -0.5_wp*up, random_rotation(2, i), &
+          spin(i, 15.0_wp))//body('cube', [0.5_wp, 0.49_wp, 0.066_wp], -0.8_wp*up, &
+          random_rotation(3, i)), world)
         energy = kinetic_energy(world%blocks)
         do n = 1, 40
-          call run(world, 1)
-          now = (kinetic_energy(world%blocks) + world%report%energy)/energy
+          call move(world, 1, dt)
+          now = (kinetic_energy(world%blocks) + world%contact%energy)/energy
           least = min(least, now)
           most = max(most, now)
         end do
@@ -602,26 +416,19 @@ contains
   !> The law with given constants, linear and with a power: a lasting contact of pi sqrt(m/k), and
   !! the deepest overlap from the energy.
   subroutine check_constants()
-    type(world_t) :: world
+    type(world_t) :: world, damped
     real(wp) :: deepest, m
     integer :: i, power
 
     do power = 1, 2
-      call new_world(world, 1, 'ball')
-      world%case%contact%law = 'constants'
-      world%case%contact%k_n = merge(1.0e5_wp, 1.0e7_wp, power == 1)
-      world%case%contact%gamma_n = 0.5_wp*(1 + power)
-      world%case%contact%eta_n = 0.0_wp
-      world%case%contact%eta_t = 0.0_wp
-      world%case%contact%contact_time = 2.0e-4_wp
-      world%case%body(1)%position(3) = 0.5_wp*d + 1.0e-4_wp
-      world%case%body(1)%velocity(3) = -0.5_wp
-      call start(world)
+      call start('law="constants" eta_n=0 eta_t=0 contact_time=2e-4 friction=0 wall_friction=0' &
+        //merge(' k_n=1e5 gamma_n=1  ', ' k_n=1e7 gamma_n=1.5', power == 1), space//ball &
+        //body('ball', [0.5_wp, 0.5_wp, 0.5_wp*d + 1.0e-4_wp], -0.5_wp*up), world)
       m = world%blocks%mass(1)
       deepest = 0.0_wp
       do i = 1, 200
-        call run(world, 1, 1.0e-5_wp)
-        deepest = max(deepest, world%report%overlap_max)
+        call move(world, 1, 1.0e-5_wp)
+        deepest = max(deepest, world%contact%overlap_max)
       end do
       associate (c => world%case%contact)
         call check('deepest overlap', c%k_n*deepest**(c%gamma_n + 1)/(c%gamma_n + 1), &
@@ -630,34 +437,27 @@ contains
       call check('springs back', world%blocks%v(3, 1), 0.5_wp, 1.0e-3_wp)
     end do
     world%case%contact%eta_n = 5.0_wp
-    call start(world)
-    call run(world, 200, 1.0e-5_wp)
-    call check('damped', world%blocks%v(3, 1) > 0.05_wp .and. world%blocks%v(3, 1) < 0.45_wp)
+    call begin(world%case, world, damped)
+    call move(damped, 200, 1.0e-5_wp)
+    call check('damped', damped%blocks%v(3, 1) > 0.05_wp .and. damped%blocks%v(3, 1) < 0.45_wp)
   end subroutine check_constants
 
   !> A sliding floor drags a cube along; a moved body pushes a ball to (1 + e) times its own speed.
   subroutine check_moving_counterparts()
     type(world_t) :: world
 
-    call new_world(world, 1, 'cube')
-    world%case%contact%wall_friction = 0.4_wp
-    world%case%boundary%velocity(:, 1, 3) = [0.2_wp, -0.1_wp, 0.0_wp]
-    world%gravity(3) = -g
-    world%case%body(1)%position(3) = lowest(shapes(2), upright)
-    call start(world)
-    call run(world, 20)
+    call start('', tank//'&boundary z_min="no_slip" z_min_velocity=.2,-.1,0/ '//cube &
+      //body('cube', middle), world)
+    world%blocks%x(3, 1) = lowest(world%shapes(1), upright)
+    call move(world, 20, dt)
     call check('dragged by mu g', norm2(world%blocks%v(1:2, 1)), 0.4_wp*g*20*dt, 5.0e-3_wp)
-    call run(world, 200)
+    call move(world, 200, dt)
     call check('moves with the floor', &
       maxval(abs(world%blocks%v(:, 1) - [0.2_wp, -0.1_wp, 0.0_wp])), &
       0.0_wp, 1.0e-6_wp)
-    call new_world(world, 2, 'ball')
-    world%case%contact%restitution = 0.5_wp
-    world%case%body(1)%fixed = .true.
-    world%case%body(1)%velocity(1) = 0.4_wp
-    world%case%body(2)%position(1) = 0.5_wp + 1.01_wp*d
-    call start(world)
-    call run(world, 10)
+    call start(smooth//'.5', space//ball//body('ball', middle, [0.4_wp, 0.0_wp, 0.0_wp], &
+      more='fixed=T')//body('ball', middle + [1.01_wp*d, 0.0_wp, 0.0_wp]), world)
+    call move(world, 10, dt)
     call check('pushed', world%blocks%v(1, 2), 0.6_wp, 0.005_wp)
     call check('the pusher keeps its speed', world%blocks%v(1, 1), 0.4_wp, 0.0_wp)
     call check('and its way', world%blocks%x(1, 1), 0.5_wp + 10*dt*0.4_wp, 1.0e-14_wp)
@@ -667,18 +467,13 @@ contains
   subroutine check_periodic_image()
     type(world_t) :: inner, outer
 
-    call new_world(inner, 2, 'ball')
-    inner%case%contact%friction = 0.3_wp
-    inner%case%boundary%kind(:, 1) = 'periodic'
-    inner%case%body(2)%position = 0.5_wp + [1.02_wp*d, 0.2_wp*d, 0.0_wp]
-    inner%case%body(2)%velocity(1) = -0.5_wp
-    outer%case = inner%case
-    outer%case%body(1)%position(1) = 0.99_wp
-    outer%case%body(2)%position(1) = 0.99_wp + 1.02_wp*d - 1.0_wp
-    call start(inner)
-    call start(outer)
-    call run(inner, 10)
-    call run(outer, 10)
+    call start('friction=.3', space//'&boundary x_min="periodic" x_max="periodic"/ '//ball &
+      //body('ball', middle)//body('ball', middle + [1.02_wp*d, 0.2_wp*d, 0.0_wp], &
+      [-0.5_wp, 0.0_wp, 0.0_wp]), inner)
+    inner%case%body%position(1) = [0.99_wp, 0.99_wp + 1.02_wp*d - 1.0_wp]
+    call begin(inner%case, inner, outer)
+    call move(inner, 10, dt)
+    call move(outer, 10, dt)
     call check('met', inner%blocks%v(1, 1) < -0.1_wp)
     call check('same velocities', maxval(abs(inner%blocks%v - outer%blocks%v)), 0.0_wp, 1.0e-10_wp)
     call check('same spins', maxval(abs(inner%blocks%omega - outer%blocks%omega)), 0.0_wp, &
@@ -689,30 +484,25 @@ contains
   !! of a restart: poses, momenta, displacements and who sleeps.
   subroutine check_bookkeeping()
     type(world_t) :: one, two
+    character(:), allocatable :: bodies
     integer :: b, n
 
-    call new_world(one, 6, 'plain')
-    one%case%contact%sleep = .true.
-    one%case%contact%friction = 0.6_wp
-    one%case%contact%wall_friction = 0.4_wp
-    one%case%grid%length = [0.06_wp, 0.05_wp, 1.0_wp]
-    one%gravity = [1.0_wp, 0.0_wp, -g]
+    bodies = ''
     do b = 1, 6
-      one%case%body(b)%position = [0.02_wp*real(1 + mod(b, 2), wp), 0.025_wp, 0.03_wp*real(b, wp)]
-      one%case%body(b)%quaternion = random_rotation(4, b)
+      bodies = bodies//body('plain', [0.02_wp*real(1 + mod(b, 2), wp), 0.025_wp, &
+        0.03_wp*real(b, wp)], q=random_rotation(4, b), more=trim(merge('release_time=1', &
+        '              ', b == 6)))
     end do
-    one%case%body(6)%release_time = 1.0_wp
-    call start(one)
-    two%case = one%case
-    two%gravity = one%gravity
-    call start(two)
+    call start('sleep=T', '&grid cells=3*2 length=.06,.05,1/ &fluid gravity=1,0,-9.81/ ' &
+      //'&shape name="plain" kind="cube" size=.02 refinement=1/ '//bodies, one)
+    call begin(one%case, one, two)
     associate (spheres => two%contacts%detected%spheres)
       spheres%skin = spheres%skin - 1.98_wp*spheres%free_way
       spheres%free_way = 0.01_wp*spheres%free_way
     end associate
     do n = 1, 3
-      call run(one, 40, 1.0e-2_wp)
-      call run(two, 40, 1.0e-2_wp)
+      call move(one, 40, 1.0e-2_wp)
+      call move(two, 40, 1.0e-2_wp)
       call check('same bits with another skin', same(one%blocks, two%blocks))
       call check('touching', sum(one%blocks%contacts) > 5)
       call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
@@ -726,8 +516,8 @@ contains
     end do
     two%contacts%displacements%xi = 0.0_wp
     two%contacts%sleep%rest%force = 0.0_wp   ! where they sleep
-    call run(one, 1)
-    call run(two, 1)
+    call move(one, 1, dt)
+    call move(two, 1, dt)
     call check('the displacements matter', .not. same(one%blocks, two%blocks))
   end subroutine check_bookkeeping
 
@@ -747,18 +537,14 @@ contains
   subroutine check_runaway()
     type(world_t) :: world
 
-    call new_world(world, 1, 'ball')
-    world%case%body(1)%velocity(3) = -100.0_wp
-    call start(world)
-    call run(world, 1)
-    call check('substeps by C_s, one where nothing is near', world%report%substeps, &
+    call start(smooth//'.3', space//ball//body('ball', middle, -100.0_wp*up), world)
+    call move(world, 1, dt)
+    call check('substeps by C_s, one where nothing is near', world%contact%substeps, &
       merge(100, 1, solvers(model) == 'springs'))   ! v dt/(0.1 d)
-    call check('nothing wrong', world%report%info, 0)
-    call new_world(world, 1, 'ball')
-    world%case%body(1)%velocity(3) = 1.0e10_wp
-    call start(world)
-    call run(world, 1)
-    call check('runaway', world%report%info, 1)
+    call check('nothing wrong', world%contact%info, 0)
+    call start(smooth//'.3', space//ball//body('ball', middle, 1.0e10_wp*up), world)
+    call move(world, 1, dt)
+    call check('runaway', world%contact%info, 1)
   end subroutine check_runaway
 
 end module test_contacts_m
