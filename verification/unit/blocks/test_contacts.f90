@@ -158,8 +158,8 @@ contains
 
     do m = 1, size(e)
       n = [0.6_wp, 0.0_wp, 0.8_wp]
-      call start(smooth//to_text(e(m)), space//ball//body('ball', middle, [0.0_wp, 0.1_wp, 0.9_wp]) &
-        //body('ball', middle + 1.001_wp*d*n, -0.3_wp*up), world)
+      call start(smooth//to_text(e(m)), space//ball//body('ball', middle, &
+        [0.0_wp, 0.1_wp, 0.9_wp])//body('ball', middle + 1.001_wp*d*n, -0.3_wp*up), world)
       before = dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n)
       call move(world, 1, dt)
       if (solvers(model) == 'springs') n = world%blocks%x(:, 2) - world%blocks%x(:, 1)

@@ -2,15 +2,9 @@
 module test_lubrication_m
   use kinds_m, only: wp, pi
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
-  use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_counterpart
-  use lubrication_m, only: lubrication_t, lubrication_init, lubricate, film_resistance, &
-    film_impulse, film_pull
-  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use lubrication_m, only: lubrication_init, lubricate, film_resistance, film_impulse, film_pull
+  use world_m, only: world_t, set_up, body, move
   implicit none
   private
   public :: test_lubrication
@@ -21,12 +15,10 @@ module test_lubrication_m
   real(wp), parameter :: a = sqrt(2.0_wp)*cell  !! film of which twice as much passes [m]
   real(wp), parameter :: dt = 5.0e-4_wp         !! [s]
   real(wp), parameter :: restitution = 0.9_wp
-  type(shape_t) :: shapes(1)
 
 contains
 
   subroutine test_lubrication()
-    call make_sphere()
     call check_resistance()
     call check_fall('no_slip', 1)
     call check_fall('slip', 2)
@@ -37,44 +29,25 @@ contains
     call check_cavitation()
   end subroutine test_lubrication
 
-  subroutine make_sphere()
-    type(case_t) :: case
-    character(:), allocatable :: message
-
-    allocate (case%shape(1))
-    case%shape(1)%name = 'ball'
-    case%shape(1)%kind = 'sphere'
-    case%shape(1)%size = d
-    case%shape(1)%density = 7800.0_wp
-    call make_shape(case%shape(1), shapes(1), message)
-  end subroutine make_sphere
-
-  !> n spheres in a tank of 1 m, and films.
-  subroutine start(kind, x, v, blocks, walls, contacts, solver)
+  !> Spheres in a tank of 1 m without gravity, and films.
+  subroutine start(kind, x, v, world, solver)
     character(*), intent(in) :: kind          !! of the floor
     real(wp), intent(in) :: x(:, :), v(:, :)  !! (3, n)
-    type(blocks_t), intent(out) :: blocks
-    type(walls_t), intent(out) :: walls
-    type(contacts_t), intent(out) :: contacts
+    type(world_t), intent(out) :: world
     character(*), intent(in), optional :: solver
-    type(case_t) :: case
+    character(:), allocatable :: text
     integer :: b
 
-    if (present(solver)) case%contact%solver = solver
-    case%contact%restitution = restitution
-    allocate (case%body(size(x, 2)), case%drop(0))
-    case%grid%length = 1.0_wp
-    case%boundary%kind(1, 3) = kind
-    case%contact%contact_time = 1.0e-4_wp
+    text = '&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &boundary z_min="'//kind &
+      //'"/ &fluid gravity=3*0/ &shape name="ball" kind="sphere" size=.006 density=7800/ ' &
+      //'&contact restitution=.9 contact_time=1e-4 '
+    if (present(solver)) text = text//'solver="'//solver//'"'
+    text = text//'/ '
     do b = 1, size(x, 2)
-      case%body(b)%shape = 'ball'
-      case%body(b)%position = x(:, b)
-      case%body(b)%velocity = v(:, b)
+      text = text//body('ball', x(:, b), v(:, b))
     end do
-    call blocks_init(case, shapes, blocks)
-    call walls_init(case%grid, case%boundary, walls)
-    call contacts_init(case%contact, blocks, contacts)
-    call lubrication_init(mu, spread(cell, 1, 3), blocks, contacts%lubrication)
+    call set_up(text, world)
+    call lubrication_init(mu, spread(cell, 1, 3), world%blocks, world%contacts%lubrication)
   end subroutine start
 
   !> The resistance is what plates at the thickness of the film say the grid misses, summed over the
@@ -112,77 +85,69 @@ contains
     character(*), intent(in) :: kind
     integer, intent(in) :: sides   !! 2: the wall is a mirror
     real(wp), parameter :: v = 0.5_wp
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-    type(contact_report_t) :: report
+    type(world_t) :: world
     real(wp) :: expected, gap
     integer :: i
 
     call start(kind, reshape([0.5_wp, 0.5_wp, d/2 + 5*cell], [3, 1]), &
-               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), blocks, walls, contacts)
+               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), world)
     do i = 1, 1000
-      call move_blocks(walls, [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-5_wp, contacts, blocks, report)
-      gap = blocks%x(3, 1) - d/2
+      call move(world, 1, 1.0e-5_wp)
+      gap = world%blocks%x(3, 1) - d/2
       if (gap < 0.02_wp*cell) exit
     end do
     expected = v - (film_impulse(mu, d/2/sides, a, 4*cell) &
-      - film_impulse(mu, d/2/sides, a, sides*gap))/blocks%mass(1)
-    call check(kind//': speed lost in the film', -blocks%v(3, 1), expected, &
+      - film_impulse(mu, d/2/sides, a, sides*gap))/world%blocks%mass(1)
+    call check(kind//': speed lost in the film', -world%blocks%v(3, 1), expected, &
                1.0e-3_wp*(v - expected))
-    call check(kind//': not touched yet', blocks%contacts(1), 0)
+    call check(kind//': not touched yet', world%blocks%contacts(1), 0)
   end subroutine check_fall
 
   !> A sphere that bounces loses what the film takes on both ways, below one step's way, too.
   subroutine check_bounce(solver)
     character(*), intent(in) :: solver
     real(wp), parameter :: v = 0.3_wp, dh = 1.0e-8_wp
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-    type(contact_report_t) :: report
+    type(world_t) :: world
     real(wp) :: expected, h
     integer :: i
 
     call start('no_slip', reshape([0.5_wp, 0.5_wp, d/2 + 4.1_wp*cell], [3, 1]), &
-               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), blocks, walls, contacts, solver)
+               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), world, solver)
     do i = 1, 100000
-      call move_blocks(walls, [0.0_wp, 0.0_wp, 0.0_wp], 2.0e-6_wp, contacts, blocks, report)
-      if (blocks%v(3, 1) > 0.0_wp .and. blocks%x(3, 1) - d/2 > 4*cell) exit
+      call move(world, 1, 2.0e-6_wp)
+      if (world%blocks%v(3, 1) > 0.0_wp .and. world%blocks%x(3, 1) - d/2 > 4*cell) exit
     end do
-    expected = restitution*(v - film_impulse(mu, d/2, a, 4*cell)/blocks%mass(1))
+    expected = restitution*(v - film_impulse(mu, d/2, a, 4*cell)/world%blocks%mass(1))
     h = 0.5_wp*dh
     do while (h < 4*cell)
-      expected = expected - film_pull(mu, d/2, a, h, expected)/(blocks%mass(1)*expected)*dh
+      expected = expected - film_pull(mu, d/2, a, h, expected)/(world%blocks%mass(1)*expected)*dh
       h = h + dh
     end do
-    print '(a, 2f9.5)', solver//': speed after a bounce in oil, expected ', blocks%v(3, 1), expected
-    call check(solver//': speed after the bounce', blocks%v(3, 1), expected, 0.003_wp*v)
+    print '(a, 2f9.5)', solver//': speed after a bounce in oil, expected ', world%blocks%v(3, 1), &
+      expected
+    call check(solver//': speed after the bounce', world%blocks%v(3, 1), expected, 0.003_wp*v)
   end subroutine check_bounce
 
   !> Two spheres that part hold one another back, with opposite forces, along the line of centres.
   subroutine check_pair()
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-    type(contact_report_t) :: report
+    type(world_t) :: world
     real(wp) :: before(3), after(3), expected, gap(2), n(3)
 
     n = [0.6_wp, 0.0_wp, 0.8_wp]
     call start('no_slip', reshape([0.5_wp + 0*n, 0.5_wp + (d + 0.3_wp*cell)*n], [3, 2]), &
-               reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.1_wp*n], [3, 2]), blocks, walls, contacts)
-    before = blocks%v(:, 1) + blocks%v(:, 2)
+               reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.1_wp*n], [3, 2]), world)
+    before = world%blocks%v(:, 1) + world%blocks%v(:, 2)
     gap(1) = 0.3_wp*cell
-    call move_blocks(walls, [0.0_wp, 0.0_wp, 0.0_wp], dt, contacts, blocks, report)
-    after = blocks%v(:, 1) + blocks%v(:, 2)
-    gap(2) = norm2(blocks%x(:, 2) - blocks%x(:, 1)) - d
+    call move(world, 1, dt)
+    after = world%blocks%v(:, 1) + world%blocks%v(:, 2)
+    gap(2) = norm2(world%blocks%x(:, 2) - world%blocks%x(:, 1)) - d
     call check('momentum of a pair', after, before, 1.0e-15_wp)
     expected = 0.1_wp - 2*(film_impulse(mu, d/4, a, gap(2)) &
-      - film_impulse(mu, d/4, a, gap(1)))/blocks%mass(1)
-    call check('speed of parting', dot_product(blocks%v(:, 2) - blocks%v(:, 1), n), expected, &
-               1.0e-3_wp*(0.1_wp - expected))
-    call check('contact force tells it', blocks%contact_force(:, 2)*dt/blocks%mass(2), &
-               blocks%v(:, 2) - 0.1_wp*n, 1.0e-12_wp)
+      - film_impulse(mu, d/4, a, gap(1)))/world%blocks%mass(1)
+    call check('speed of parting', dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n), &
+               expected, 1.0e-3_wp*(0.1_wp - expected))
+    call check('contact force tells it', world%blocks%contact_force(:, 2)*dt/world%blocks%mass(2), &
+               world%blocks%v(:, 2) - 0.1_wp*n, 1.0e-12_wp)
   end subroutine check_pair
 
   !> In a swarm each sphere feels the films of all its neighbours, those across a period too, and of
@@ -190,9 +155,7 @@ contains
   subroutine check_swarm()
     integer, parameter :: n = 40
     real(wp), parameter :: capacity = 4*d   ! of the swarm, astride the periodic side [m]
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
+    type(world_t) :: world
     real(wp) :: x(3, n), v(3, n), force(3, bed_counterpart:n), pair(3, bed_counterpart:2), &
       expected(3, n)
     integer :: i, j, active
@@ -206,21 +169,21 @@ contains
     active = 0
     do i = 1, n
       do j = i + 1, n
-        call start('no_slip', x(:, [i, j]), v(:, [i, j]), blocks, walls, contacts)
-        walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
-        walls%n = 0
+        call start('no_slip', x(:, [i, j]), v(:, [i, j]), world)
+        world%walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
+        world%walls%n = 0
         pair = 0.0_wp
-        call lubricate(walls, blocks, dt, 0.0_wp, contacts%lubrication, pair)
+        call lubricate(world%walls, world%blocks, dt, 0.0_wp, world%contacts%lubrication, pair)
         expected(:, i) = expected(:, i) + pair(:, 1)
         expected(:, j) = expected(:, j) + pair(:, 2)
         if (norm2(pair(:, 1)) > 0.0_wp) active = active + 1
       end do
     end do
-    call start('no_slip', x, v, blocks, walls, contacts)
-    walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
-    walls%n = 0
+    call start('no_slip', x, v, world)
+    world%walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
+    world%walls%n = 0
     force = 0.0_wp
-    call lubricate(walls, blocks, dt, 0.0_wp, contacts%lubrication, force)
+    call lubricate(world%walls, world%blocks, dt, 0.0_wp, world%contacts%lubrication, force)
     call check('some pairs have a film, most have none', active > n/2 .and. active < n*(n - 1)/4)
     do i = 1, n
       call check('force on a sphere of the swarm', force(:, i), expected(:, i), &

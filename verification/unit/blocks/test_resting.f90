@@ -3,85 +3,51 @@
 module test_resting_m
   use kinds_m, only: wp
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
-  use walls_m, only: walls_t, walls_init
+  use errors_m, only: to_text
   use sleep_m, only: update_stillness
   use counterparts_m, only: update_counterparts
   use contact_detection_m, only: detect_contacts
-  use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_resting
 
-  !> A ball in balance on the floor, or on another ball that is held, slow for long.
-  type :: world_t
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-  end type world_t
-
   real(wp), parameter :: r = 0.05_wp          !! of the balls [m]
   real(wp), parameter :: k_n = 1.0e6_wp       !! of their springs [N/m]
   real(wp), parameter :: dt = 1.0e-3_wp, gravity(3) = [0.0_wp, 0.0_wp, -10.0_wp]
-  type(shape_t) :: shapes(1)
   real(wp) :: load                            !! weight of a ball [N]
 
 contains
 
   subroutine test_resting()
-    call make_ball()
     call check_balance()
     call check_contact()
     call check_displacements()
     call check_held()
   end subroutine test_resting
 
-  subroutine make_ball()
-    type(case_t) :: case
-    character(:), allocatable :: message
-
-    allocate (case%shape(1))
-    case%shape(1)%name = 'ball'
-    case%shape(1)%kind = 'sphere'
-    case%shape(1)%size = 2*r
-    call make_shape(case%shape(1), shapes(1), message)
-    load = 10.0_wp*shapes(1)%density*shapes(1)%volume
-  end subroutine make_ball
-
-  !> A ball whose spring carries a part of its weight.
+  !> A ball on the floor, or on another one that is held, whose spring carries a part of its weight;
+  !! it has been slow for long.
   subroutine begin(part, support, speed, world)
     real(wp), intent(in) :: part         !! 1: in balance [-]
     integer, intent(in) :: support       !! 0: the floor, 1: a ball that is held
     real(wp), intent(in) :: speed        !! of the support [m/s]
     type(world_t), intent(out) :: world
-    type(case_t) :: case
-    integer :: b
+    character(:), allocatable :: held, floor
     logical :: changed
 
-    case%grid%length = 1.0_wp
-    case%contact%law = 'constants'
-    case%contact%k_n = k_n
-    case%contact%eta_n = 0.0_wp
-    case%contact%eta_t = 0.0_wp
-    if (support == 0) case%boundary%velocity(1, 1, 3) = speed
-    allocate (case%body(1 + support), case%drop(0))
-    case%body%shape = 'ball'
-    do b = 1, 1 + support
-      case%body(b)%position = [0.5_wp, 0.5_wp, r]
-    end do
-    if (support == 1) then
-      case%body(1)%fixed = .true.
-      case%body(1)%velocity(1) = speed
-    end if
-    b = 1 + support
-    case%body(b)%position(3) = r + 2*r*support - part*load/k_n
-    call blocks_init(case, shapes, world%blocks)
-    call walls_init(case%grid, case%boundary, world%walls)
-    call contacts_init(case%contact, world%blocks, world%contacts)
+    held = ''
+    floor = ''
+    if (support == 0) floor = ' z_min_velocity='//to_text([speed, 0.0_wp, 0.0_wp])
+    if (support == 1) held = body('ball', [0.5_wp, 0.5_wp, r], [speed, 0.0_wp, 0.0_wp], &
+      more='fixed=T')
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &fluid gravity=0,0,-10/ ' &
+      //'&boundary z_min="no_slip"'//floor//'/ &contact law="constants" k_n=1e6 eta_n=0 eta_t=0/ ' &
+      //'&shape name="ball" kind="sphere" size=.1/ '//held//body('ball', [0.5_wp, 0.5_wp, r]), &
+      world)
+    load = 10.0_wp*world%shapes(1)%density*world%shapes(1)%volume
+    world%blocks%x(3, 1 + support) = r + 2*r*support - part*load/k_n
     call update_counterparts(world%walls, gravity, world%blocks, &
       world%contacts%detected%counterparts)
     call update_stillness(world%blocks, changed)

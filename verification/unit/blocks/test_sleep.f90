@@ -4,41 +4,25 @@ module test_sleep_m
   use kinds_m, only: wp
   use vectors_m, only: quaternion_from_axis, quaternion_product
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init, release_body, kinetic_energy, potential_energy, &
-    set_velocity_after_fluid
-  use walls_m, only: walls_t, walls_init
+  use rigid_body_m, only: release_body, kinetic_energy, potential_energy, set_velocity_after_fluid
   use displacements_m, only: reserve_displacements
   use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_poses, store_quiet, &
     may_sleep, update_loads
-  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use world_m, only: world_t, set_up, begin, body, move
   implicit none
   private
   public :: test_sleep
 
-  type :: world_t
-    type(case_t) :: case
-    real(wp) :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contacts_t) :: contacts
-    type(contact_report_t) :: report
-  end type world_t
-
   real(wp), parameter :: d = 0.02_wp         !! edge of the cube [m]
-  real(wp), parameter :: g = 9.81_wp         !! [m/s2]
+  real(wp), parameter :: g = 9.81_wp, gravity(3) = [0.0_wp, 0.0_wp, -g]   !! [m/s2]
   real(wp), parameter :: mu = 0.4_wp         !! friction of all [-]
   real(wp), parameter :: dt = 1.0e-2_wp      !! [s]
   character(*), parameter :: models(2) = [character(7) :: 'spheres', 'surface']
-  type(shape_t) :: shapes(2)
   integer :: model
 
 contains
 
   subroutine test_sleep()
-    call make_shapes()
     call check_balanced()
     call check_loads()
     do model = 1, 2
@@ -56,22 +40,6 @@ contains
       call check_edge()
     end do
   end subroutine test_sleep
-
-  subroutine make_shapes()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(2))
-    case%shape%name = [character(4) :: 'cube', 'slab']
-    case%shape%kind = [character(4) :: 'cube', 'box']
-    case%shape%refinement = 1
-    do s = 1, 2
-      case%shape(s)%size = d
-      if (s == 2) case%shape(s)%size = [6*d, 6*d, d]
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-  end subroutine make_shapes
 
   !> Contact balances all else within a tolerance of it, torques within that at the radius of the
   !! body; without any load only in full.
@@ -97,8 +65,7 @@ contains
     integer :: b, n
     real(wp), parameter :: radius = 0.3_wp
 
-    call new_world(.true., 4, world)
-    call start(world)
+    call start(tower(4), world)
     call sleep_init(.true., spread(radius, 1, 4), sleep)
     fall = sqrt(radius/g)
     way = 5.0e-4_wp*sqrt(g*radius)*0.101_wp*fall
@@ -109,9 +76,9 @@ contains
       do n = 1, 9
         call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
       end do
-      call check('not yet', .not. any([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)]))
+      call check('not yet', .not. any([(may_sleep(gravity, b, blocks, sleep), b=1, 4)]))
       call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
-      call check('candidates', all([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)] &
+      call check('candidates', all([(may_sleep(gravity, b, blocks, sleep), b=1, 4)] &
         .eqv. [.true., .true., .false., .false.]))
       call creep(world, way, [0.99_wp, 0.5_wp], 0.51_wp, sleep)
       call check('turns too fast', sleep%quiet(:2), [11*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
@@ -132,7 +99,7 @@ contains
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
         turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))
-      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
+      call store_quiet(gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
     end associate
   end subroutine creep
 
@@ -154,68 +121,49 @@ contains
     call check('torques at rest', sleep%load_torque(1, :), [407.0_wp, 20.0_wp, 30.0_wp], 0.0_wp)
   end subroutine check_loads
 
-  !> A tank of 1 m with n cubes above one another on its floor.
-  subroutine new_world(sleep, n, world)
-    logical, intent(in) :: sleep
-    integer, intent(in) :: n
+  !> Bodies in a tank of 1 m; another one without sleep, too.
+  subroutine start(groups, world, awake, contact)
+    character(*), intent(in) :: groups
     type(world_t), intent(out) :: world
-    integer :: b
+    type(world_t), intent(out), optional :: awake
+    character(*), intent(in), optional :: contact   !! variables of &contact
+    character(:), allocatable :: friction
 
-    allocate (world%case%body(n), world%case%drop(0))
-    world%case%grid%length = 1.0_wp
-    world%case%contact%model = models(model)
-    world%case%contact%friction = mu
-    world%case%contact%wall_friction = mu
-    world%case%contact%sleep = sleep
-    do b = 1, n
-      world%case%body(b)%shape = 'cube'
-      world%case%body(b)%position = [0.5_wp, 0.5_wp, d*(real(b, wp) - 0.5_wp)]
-    end do
-  end subroutine new_world
-
-  subroutine start(world)
-    type(world_t), intent(inout) :: world
-
-    call blocks_init(world%case, shapes, world%blocks)
-    call walls_init(world%case%grid, world%case%boundary, world%walls)
-    call contacts_init(world%case%contact, world%blocks, world%contacts)
+    friction = '" friction=.4 wall_friction=.4 '
+    if (present(contact)) friction = friction//contact
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="cube" ' &
+      //'kind="cube" size=.02 refinement=1/ &shape name="slab" kind="box" size=.12,.12,.02 ' &
+      //'refinement=1/ &contact model="'//trim(models(model))//friction//'/ ' &
+      //groups, world)
+    if (.not. present(awake)) return
+    world%case%contact%sleep = .false.
+    call begin(world%case, world, awake)
   end subroutine start
 
-  !> Start a world, and another one with the same case but without sleep.
-  subroutine start_both(one, two)
-    type(world_t), intent(inout) :: one, two
+  !> Cubes above one another on the floor, the lowest ones left out.
+  function tower(n, from) result(text)
+    integer, intent(in) :: n
+    integer, intent(in), optional :: from   !! else 1
+    character(:), allocatable :: text
+    integer :: b, first
 
-    call start(one)
-    two%case = one%case
-    two%case%contact%sleep = .false.
-    call start(two)
-  end subroutine start_both
-
-  !> Run both for the same time.
-  subroutine run_both(one, two, time)
-    type(world_t), intent(inout) :: one, two
-    real(wp), intent(in) :: time   !! [s]
-
-    call run(one, time)
-    call run(two, time)
-  end subroutine run_both
-
-  !> Run for a time.
-  subroutine run(world, time)
-    type(world_t), intent(inout) :: world
-    real(wp), intent(in) :: time   !! [s]
-    integer :: i
-
-    do i = 1, nint(time/dt)
-      call step(world)
+    first = 1
+    if (present(from)) first = from
+    text = ''
+    do b = first, n
+      text = text//body('cube', [0.5_wp, 0.5_wp, d*(real(b, wp) - 0.5_wp)])
     end do
-  end subroutine run
+  end function tower
 
-  subroutine step(world)
+  !> Let worlds go on for a time.
+  subroutine run(time, world, other)
+    real(wp), intent(in) :: time   !! [s]
     type(world_t), intent(inout) :: world
+    type(world_t), intent(inout), optional :: other
 
-    call move_blocks(world%walls, world%gravity, dt, world%contacts, world%blocks, world%report)
-  end subroutine step
+    call move(world, nint(time/dt), dt)
+    if (present(other)) call move(other, nint(time/dt), dt)
+  end subroutine run
 
   !> Weight of a cube [N].
   function weight(world)
@@ -228,22 +176,23 @@ contains
   !> Cubes on a slab that is held (three; on contact spheres one) sleep where they stand, cost
   !! nothing, and what is told of them is the same as of blocks that do not sleep.
   subroutine check_rest()
+    character(*), parameter :: held = '&body shape="slab" position=.5,.5,.01 fixed=T/ '
     type(world_t) :: one, two
     integer :: n
 
     n = merge(1, 3, model == 1)
-    call new_world(.true., n + 1, one)
-    one%case%body(1)%shape = 'slab'
-    one%case%body(1)%fixed = .true.
-    if (model == 1) one%case%body(2)%position(3) = 1.6826_wp*d   ! on the tips of its spheres
-    call start_both(one, two)
-    call run_both(one, two, 0.9_wp)
+    if (model == 1) then   ! on the tips of its spheres
+      call start(held//body('cube', [0.5_wp, 0.5_wp, 1.6826_wp*d]), one, two)
+    else
+      call start(held//tower(4, 2), one, two)
+    end if
+    call run(0.9_wp, one, two)
     call check('all sleep', count(one%blocks%asleep), n)
     call check('nobody sleeps without sleep', count(two%blocks%asleep), 0)
     call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp, 0.0_wp)
-    call check('no substeps', one%report%substeps, 0)
+    call check('no substeps', one%contact%substeps, 0)
     call check('same poses', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 1.0e-8_wp)
-    call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 2*rest_tolerance)
+    call check('same energy', one%contact%energy/two%contact%energy, 1.0_wp, 2*rest_tolerance)
     call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
     call check('balance', maxval(abs(one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g)), &
       0.0_wp, 1.0e-12_wp)
@@ -260,13 +209,10 @@ contains
     real(wp) :: before(3), dropped
     integer :: n
 
-    call new_world(.true., 3, one)
-    one%case%body(2)%release_time = 9.0_wp   ! never
-    one%case%body(3)%position = [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d]
-    one%case%body(3)%velocity = [0.5_wp, 0.0_wp, 0.0_wp]
-    one%case%body(3)%release_time = 1.0_wp
-    call start_both(one, two)
-    call run_both(one, two, 1.0_wp)
+    call start(tower(1)//body('cube', [0.5_wp, 0.5_wp, 1.5_wp*d], more='release_time=9') &
+      //body('cube', [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d], [0.5_wp, 0.0_wp, 0.0_wp], &
+      more='release_time=1'), one, two)
+    call run(1.0_wp, one, two)
     call check('sleeps', one%blocks%asleep(1))
     call release_body(1.0_wp, 3, one%blocks)
     call release_body(1.0_wp, 3, two%blocks)
@@ -275,17 +221,17 @@ contains
     dropped = 0.0_wp
     do n = 1, 10
       before = momentum(one)
-      call step(one)
-      call step(two)
+      call move(one, 1, dt)
+      call move(two, 1, dt)
       dropped = max(dropped, maxval(abs(momentum(one) - before &
-        - dt*(sum(one%blocks%contact_force, 2) + 2*one%blocks%mass(1)*one%gravity))))
+        - dt*(sum(one%blocks%contact_force, 2) + 2*one%blocks%mass(1)*one%case%fluid%gravity))))
     end do
     call check('awake', .not. one%blocks%asleep(1))
     call check('momentum is kept', dropped, 0.0_wp, 1.0e-12_wp)
     call check('pushed', two%blocks%x(1, 1) > 0.5_wp + 0.1_wp*d)
     call check('as if awake', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 5.0e-3_wp*d)
     call check('as fast', maxval(abs(one%blocks%v - two%blocks%v)), 0.0_wp, 5.0e-3_wp*0.5_wp)
-    call run(one, 1.5_wp)
+    call run(1.5_wp, one)
     call check('both sleep again', count(one%blocks%asleep), 2)
   end subroutine check_hit
 
@@ -302,21 +248,16 @@ contains
   subroutine check_support()
     type(world_t) :: one, two
 
-    call new_world(.true., 3, one)
-    one%case%body(2)%position = [0.5_wp + 0.3_wp*d, 0.5_wp, 1.5_wp*d]
-    one%case%contact%courant_max = 0.01_wp   ! impacts then do not depend on the substeps
-    one%case%body(3)%position = [0.5_wp - 4*d, 0.5_wp, 0.55_wp*d]
-    one%case%body(3)%fixed = .true.
-    one%case%body(3)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
-    one%case%body(3)%release_time = 1.0_wp
-    call start_both(one, two)
-    call run_both(one, two, 1.0_wp)
+    call start(tower(1)//body('cube', [0.5_wp + 0.3_wp*d, 0.5_wp, 1.5_wp*d]) &
+      //body('cube', [0.5_wp - 4*d, 0.5_wp, 0.55_wp*d], [1.0_wp, 0.0_wp, 0.0_wp], &
+      more='fixed=T release_time=1'), one, two, 'courant_max=.01')   ! free of the substeps
+    call run(1.0_wp, one, two)
     call check('both sleep', count(one%blocks%asleep), 2)
     call release_body(1.0_wp, 3, one%blocks)
     call release_body(1.0_wp, 3, two%blocks)
-    call run_both(one, two, 0.03_wp)
+    call run(0.03_wp, one, two)
     call check('sleep until touched', count(one%blocks%asleep), 2)
-    call run_both(one, two, 0.07_wp)
+    call run(0.07_wp, one, two)
     call check('both are awake', count(one%blocks%asleep), 0)
     call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
     call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
@@ -332,28 +273,25 @@ contains
     real(wp) :: slope, v, energy, x(3)
 
     slope = atan(mu*1.002_wp)
-    call new_world(.true., 1, world)
-    world%case%body(1)%position(1) = 0.1_wp
-    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    call start(world)
-    call run(world, 0.5_wp)
+    call start(body('cube', [0.1_wp, 0.5_wp, 0.5_wp*d]), world)
+    world%case%fluid%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
+    call run(0.5_wp, world)
     v = world%blocks%v(1, 1)
-    call run(world, 1.0_wp)
+    call run(1.0_wp, world)
     call check('slides', world%blocks%v(1, 1) - v, g*(sin(slope) - mu*cos(slope)), 1.0e-4_wp)
     call check('does not sleep on a slope too steep', .not. world%blocks%asleep(1))
     slope = atan(mu*0.95_wp)
-    call new_world(.true., 1, world)
-    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    call start(world)
-    call run(world, 1.5_wp)
+    call start(tower(1), world)
+    world%case%fluid%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
+    call run(1.5_wp, world)
     call check('sleeps on a slope less steep', world%blocks%asleep(1))
     x = world%blocks%x(:, 1)
-    energy = world%report%energy
+    energy = world%contact%energy
     world%blocks%fluid_force(2, 1) = 0.03_wp*weight(world)
-    call step(world)
+    call move(world, 1, dt)
     call check('awake on the slope', .not. world%blocks%asleep(1))
     call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
-    call check('keeps its displacements: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
+    call check('keeps its displacements: energy', world%contact%energy/energy, 1.0_wp, 0.01_wp)
   end subroutine check_slope
 
   !> Fluid force on a sleeper grows: it slides once it passes friction, within 2 % of the load, and
@@ -363,15 +301,14 @@ contains
     real(wp) :: force
     integer :: n
 
-    call new_world(.true., 1, world)
-    call start(world)
-    call run(world, 1.0_wp)
+    call start(tower(1), world)
+    call run(1.0_wp, world)
     call check('sleeps in still water', world%blocks%asleep(1))
     do n = 1, 1000
       force = 1.2_wp*mu*weight(world)*real(n, wp)/1000.0_wp
       world%blocks%fluid_force(1, 1) = force
-      call step(world)
-      call set_velocity_after_fluid(world%gravity, dt, world%blocks%fluid_force, &
+      call move(world, 1, dt)
+      call set_velocity_after_fluid(world%case%fluid%gravity, dt, world%blocks%fluid_force, &
         world%blocks%fluid_torque, world%blocks)
       call check_balance(world)
       if (world%blocks%v(1, 1) > 1.0e-3_wp) exit
@@ -379,10 +316,10 @@ contains
     call check('slides at mu W', force/(mu*weight(world)), 1.0_wp, 0.015_wp)
     call check('awake in the current', .not. world%blocks%asleep(1))
     world%blocks%fluid_force = 0.0_wp
-    call run(world, 1.0_wp)
+    call run(1.0_wp, world)
     call check('sleeps again', world%blocks%asleep(1))
     world%blocks%fluid_torque(2, 1) = 0.03_wp*weight(world)*d
-    call step(world)
+    call move(world, 1, dt)
     call check('a torque wakes', .not. world%blocks%asleep(1))
   end subroutine check_flow
 
@@ -392,8 +329,8 @@ contains
     real(wp) :: rest(3)
 
     associate (b => world%blocks)
-      rest = b%mass(1)*((b%v(:, 1) - b%v_start(:, 1))/dt - world%gravity) - b%contact_force(:, 1) &
-        - b%fluid_force(:, 1)
+      rest = b%mass(1)*((b%v(:, 1) - b%v_start(:, 1))/dt - world%case%fluid%gravity) &
+        - b%contact_force(:, 1) - b%fluid_force(:, 1)
     end associate
     if (maxval(abs(rest)) > 1.0e-12_wp) call check('balance of forces', rest, 0*rest, 1.0e-12_wp)
   end subroutine check_balance
@@ -402,30 +339,25 @@ contains
   subroutine check_afloat()
     type(world_t) :: world
 
-    call new_world(.true., 1, world)
-    world%case%body(1)%position(3) = 0.5_wp
-    call start(world)
-    world%blocks%fluid_force(:, 1) = -world%blocks%mass(1)*world%gravity
-    call run(world, 1.0_wp)
+    call start('&body shape="cube" position=3*.5/', world)
+    world%blocks%fluid_force(:, 1) = -world%blocks%mass(1)*world%case%fluid%gravity
+    call run(1.0_wp, world)
     call check('afloat', .not. world%blocks%asleep(1))
-    call new_world(.true., 1, world)
-    world%gravity = 0.0_wp
-    call start(world)
-    call run(world, 1.0_wp)
+    call start('&fluid gravity=3*0/ '//tower(1), world)
+    call run(1.0_wp, world)
     call check('weightless', .not. world%blocks%asleep(1))
   end subroutine check_afloat
 
   !> Nobody sleeps on a floor that moves.
   subroutine check_belt()
-    type(world_t) :: world
+    type(world_t) :: world, belt
 
-    call new_world(.true., 1, world)
+    call start('&boundary z_min="no_slip" z_min_velocity=.1,0,0/ '//tower(1), world)
     world%case%contact%wall_friction = 0.0_wp
-    world%case%boundary%velocity(1, 1, 3) = 0.1_wp
-    call start(world)
-    call run(world, 1.0_wp)
-    call check('awake on a belt', .not. world%blocks%asleep(1))
-    call check('that does not rub', abs(world%blocks%v(1, 1)), 0.0_wp, 1.0e-12_wp)
+    call begin(world%case, world, belt)
+    call run(1.0_wp, belt)
+    call check('awake on a belt', .not. belt%blocks%asleep(1))
+    call check('that does not rub', abs(belt%blocks%v(1, 1)), 0.0_wp, 1.0e-12_wp)
   end subroutine check_belt
 
   !> A cube on its edge that leans by 5e-4 falls over, though the torque on it is less than what a
@@ -434,11 +366,9 @@ contains
     type(world_t) :: world
     real(wp), parameter :: upright = atan(1.0_wp), up(2) = [sqrt(0.5_wp), 0.5_wp]
 
-    call new_world(.true., 1, world)
-    world%case%body(1)%position(3) = up(1)*d
-    call start(world)
-    world%blocks%q(:, 1) = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], upright + 5.0e-4_wp)
-    call run(world, 1.5_wp)
+    call start(body('cube', [0.5_wp, 0.5_wp, up(1)*d], q=quaternion_from_axis( &
+      [0.0_wp, 1.0_wp, 0.0_wp], upright + 5.0e-4_wp)), world)
+    call run(1.5_wp, world)
     call check('falls from its edge', world%blocks%x(3, 1), up(2)*d, 1.0e-3_wp*d)
     call check('sleeps on its face', world%blocks%asleep(1))
   end subroutine check_edge
@@ -446,29 +376,28 @@ contains
   !> A push at one end of a row of sleepers reaches the other end, as if all were awake.
   subroutine check_chain()
     type(world_t) :: one, two
-    integer :: b, n
+    character(:), allocatable :: row
+    integer, parameter :: n = 5
+    integer :: b
 
-    n = 5
-    call new_world(.true., n + 1, one)
+    row = ''
     do b = 1, n
-      one%case%body(b)%position = [0.4_wp + d*real(b, wp), 0.5_wp, 0.5_wp*d]
+      row = row//body('cube', [0.4_wp + d*real(b, wp), 0.5_wp, 0.5_wp*d])
     end do
-    one%case%body(n + 1)%position = [0.4_wp - 0.1_wp*d, 0.5_wp, 0.52_wp*d]
-    one%case%body(n + 1)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
-    one%case%body(n + 1)%release_time = 1.0_wp
-    call start_both(one, two)
-    call run_both(one, two, 1.0_wp)
+    call start(row//body('cube', [0.4_wp - 0.1_wp*d, 0.5_wp, 0.52_wp*d], [1.0_wp, 0.0_wp, 0.0_wp], &
+      more='release_time=1'), one, two)
+    call run(1.0_wp, one, two)
     call check('all of the row sleep', count(one%blocks%asleep), n)
     call release_body(1.0_wp, n + 1, one%blocks)
     call release_body(1.0_wp, n + 1, two%blocks)
-    call run_both(one, two, 0.04_wp)
+    call run(0.04_wp, one, two)
     call check('all of the row are awake', count(one%blocks%asleep), 0)
     call check('the last one moves', two%blocks%v(1, n) > 0.1_wp)
     call check('row as fast', maxval(abs(one%blocks%v(1, :) - two%blocks%v(1, :))), 0.0_wp, 0.02_wp)
     call check('energy of the row', (kinetic_energy(one%blocks) &
-      + potential_energy(one%gravity, one%blocks) + one%report%energy) &
-      /(kinetic_energy(two%blocks) + potential_energy(two%gravity, two%blocks) &
-        + two%report%energy), 1.0_wp, 0.01_wp)
+      + potential_energy(one%case%fluid%gravity, one%blocks) + one%contact%energy) &
+      /(kinetic_energy(two%blocks) + potential_energy(two%case%fluid%gravity, two%blocks) &
+        + two%contact%energy), 1.0_wp, 0.01_wp)
   end subroutine check_chain
 
 end module test_sleep_m
