@@ -1,8 +1,8 @@
 """What `--check` says to a text: tables of rows `text => messages` in verification/messages.
 
 A row is a case, or a file that a case names, with its messages behind `=>`, each on a line; `good`
-means none, `...` at the end that others may follow, `warning:` what the plan says. `##` begins a
-remark, `$name` stands for a text of STARTS, `\\x1b` for a byte.
+means no fault, `none` no warning either, `...` at the end that others may follow, `warning:` what
+the plan says. `##` begins a remark, `$name` stands for a text of STARTS, `\\x1b` for a byte.
 """
 
 import re
@@ -23,6 +23,8 @@ STARTS = {
     "grid": GRID,
     "tank": RUN + GRID,
     "cube": RUN + GRID + "&shape name = 'c' kind = 'cube' size = 0.02 /\n",
+    "cubes": RUN + "&grid cells = 15, 10, 10  length = 0.3, 0.2, 0.2 /\n"
+    "&shape name = 'cube'  kind = 'cube'  size = 0.02 /\n",
     "ball": "&shape name = 's' kind = 'sphere' size = 0.02 /\n",
     "cross": "&shape name = 'h' kind = 'hexapod' size = 0.02 /\n",
     "empty": "",
@@ -37,6 +39,7 @@ NAMED = {
     "shape": "&shape name = 'f' kind = 'file' file = 'f' /",
     "heightmap": "&bed file = 'f' kind = 'heightmap' /",
     "stl": "&bed file = 'f' kind = 'stl' /",
+    "plan": "&shape name = 'cube' kind = 'cube' size = 0.02 / &drop file = 'f' /",
 }
 """The group that names the file of a row, by table."""
 
@@ -85,7 +88,9 @@ def compare(found: list[str], told: list[str]) -> None:
     if told[-1].endswith(" ..."):
         told = [*told[:-1], told[-1].removesuffix(" ...")]
         found = found[: len(told)]
-    if told == ["good"]:
+    if told == ["none"]:
+        assert found == []
+    elif told == ["good"]:
         assert all(line.startswith("warning: ") for line in found), found
     else:
         assert found == told
@@ -108,7 +113,7 @@ def of_file(folder: Path, table: str, content: bytes) -> list[str]:
     ("table", "text", "told"), [(t, text, told) for t in NAMED for text, told in rows(t)]
 )
 def test_file(table: str, text: str, told: list[str], tmp_path: Path) -> None:
-    """A text as a shape or a bed."""
+    """A text as a shape, a bed or a plan."""
     compare(of_file(tmp_path, table, expanded(text)), told)
 
 

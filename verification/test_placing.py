@@ -19,59 +19,6 @@ TANK = """&run t_end = 0.01  physics = 'dry'  dt = 0.01 /
 HEAD = "shape,x,y,z,time,yaw_deg,pitch_deg,roll_deg,vx,vy,vz,fixed,name\n"
 ROW = "cube,0.1,0.1,0.1,0,0,0,0,0,0,0,no,A1\n"
 
-DAMAGED = {
-    "shape": (ROW.replace("cube", "cub"), "column 1 (shape) = 'cub': no &shape has this name, "
-              "nearest known: 'cube'"),
-    "no shape": (ROW.replace("cube", ""), "column 1 (shape) = '': no &shape has this name"),
-    "x": (ROW.replace("0.1,0.1,0.1", "east,0.1,0.1"), "column 2 (x) = 'east': must be a number"),
-    "x empty": (ROW.replace("0.1,0.1,0.1", ",0.1,0.1"), "column 2 (x) = '': is empty"),
-    "y nan": (ROW.replace("0.1,0.1,0.1", "0.1,nan,0.1"), "column 3 (y) = 'nan': must be a finite"),
-    "z inf": (ROW.replace("0.1,0.1,0.1", "0.1,0.1,inf"), "column 4 (z) = 'inf': must be a finite"),
-    "z huge": (ROW.replace("0.1,0.1,0.1", "0.1,0.1,1e99"), "column 4 (z) = '1e99': must be 0 or"),
-    "decimal comma": (ROW.replace("0.1,0.1,0.1", '"0,1",0.1,0.1'), "column 2 (x) = '0,1': must be "
-                      "a number, with a decimal point"),
-    "time": (ROW.replace("0.1,0,0,0", "0.1,soon,0,0"), "column 5 (time) = 'soon': must be a num"),
-    "no time": (ROW.replace("0.1,0,0,0", "0.1,,0,0"), "column 5 (time) = '': is empty"),
-    "before": (ROW.replace("0.1,0,0,0", "0.1,-1,0,0"), "column 5 (time) = '-1': must not be neg"),
-    "yaw": (ROW.replace("0.1,0,0,0", "0.1,0,N45E,0"), "column 6 (yaw_deg) = 'N45E': must be a n"),
-    "pitch": (ROW.replace("0.1,0,0,0", "0.1,0,0,up"), "column 7 (pitch_deg) = 'up': must be a n"),
-    "roll": (ROW.replace("0.1,0,0,0,0", "0.1,0,0,0,x"), "column 8 (roll_deg) = 'x': must be a n"),
-    "velocity": (ROW.replace("0,0,no", "0,fast,no"), "column 11 (vz) = 'fast': must be a number"),
-    "fixed": (ROW.replace("no", "maybe"), "column 12 (fixed) = 'maybe': must be true or false, "
-              "yes or no, 1 or 0"),
-    "name": (ROW.replace("A1", 80 * "A"), "column 13 (name) = '"),
-    "too few": ("cube,0.1,0.1\n", "column 4: 3 cells, but the table has 13 columns"),
-    "too many": (ROW.replace("A1", "A1,A2"), "column 14: 14 cells, but the table has 13 columns"),
-    "quote": (ROW.replace("A1", '"A1'), "column 13: no second \" closes the text on this line"),
-}  # fmt: skip
-"""A row of its own each, and what is told after its line."""
-
-HEADS = {
-    "unknown": ("shape,x,y,z,time,jaw_deg\ncube,0.1,0.1,0.1,0,0\n", "line 1, column 6 (jaw_deg): "
-                "unknown, nearest known: yaw_deg"),
-    "missing": ("shape,x,y\ncube,0.1,0.1\n", "line 1: missing: z, time"),
-    "twice": ("shape,x,y,z,time,x\ncube,0.1,0.1,0.1,0,0\n", "line 1, column 6 (x): is there twice"),
-    "no name": ("shape,x,,y,z,time\ncube,0.1,0,0.1,0.1,0\n", "line 1, column 3: has no name"),
-    "both attitudes": ("shape,x,y,z,time,qw,qx,qy,qz,yaw_deg\ncube,0.1,0.1,0.1,0,1,0,0,0,0\n",
-                       "line 1: give a quaternion or angles, not both"),
-    "half a quaternion": ("shape,x,y,z,time,qw\ncube,0.1,0.1,0.1,0,1\n",
-                          "line 1: a quaternion needs qw, qx, qy and qz"),
-    "no quaternion": ("shape,x,y,z,time,qw,qx,qy,qz\ncube,0.1,0.1,0.1,0,0,0,0,0\n",
-                      "line 2, column 6 (qw) = '0': a quaternion must not be zero"),
-    "part of one": ("shape,x,y,z,time,qw,qx,qy,qz\ncube,0.1,0.1,0.1,0,1,0,,0\n",
-                    "line 2, column 8 (qy) = '': is empty, a number is needed"),
-    "no rows": (HEAD, "holds no places"),
-    "nothing": ("# a remark\n\n", "the file is empty"),
-    "binary": ("shape,x\0", "holds zero bytes; a table is plain text in UTF-8"),
-    "wall": ("shape,x,y,z,time\ncube,0.005,0.1,0.1,0\n", "line 2: reaches 0.005 m through the wall "
-             "x_min; it could never be released"),
-    "two fixed": ("shape,x,y,z,time,fixed\ncube,0.1,0.1,0.1,0,1\ncube,0.11,0.1,0.1,1,1\n",
-                  "line 3: overlaps the block on line 2 of plan.csv by 0.01 m"),
-    "in a fixed one": ("shape,x,y,z,time,fixed\ncube,0.1,0.1,0.1,0,1\ncube,0.11,0.1,0.1,1,0\n",
-                       "line 3: lies inside the fixed block on line 2 of plan.csv"),
-}  # fmt: skip
-"""Whole tables, and what is told."""
-
 
 def put(folder: Path, table: str | bytes, drop: str = "", tank: str = TANK) -> str:
     """A case with a table beside it; the name of the case."""
@@ -79,33 +26,6 @@ def put(folder: Path, table: str | bytes, drop: str = "", tank: str = TANK) -> s
     (folder / "plan.csv").write_bytes(data)
     (folder / "case.nml").write_text(f"{tank}&drop file = 'plan.csv'  {drop}/\n")
     return str(folder / "case.nml")
-
-
-def told(folder: Path, table: str | bytes, drop: str = "", tank: str = TANK) -> list[str]:
-    """What is wrong with a table, each told with the file."""
-    done = mics([put(folder, table, drop, tank)], folder)
-    assert done.returncode == 2 and done.stdout == ""
-    assert sorted(path.name for path in folder.iterdir()) == ["case.nml", "plan.csv"]
-    start = "mics: &drop file = 'plan.csv': "
-    assert all(line.startswith(start) for line in done.stderr.splitlines()), done.stderr
-    return [line.removeprefix(start) for line in done.stderr.splitlines()]
-
-
-def test_damaged_rows_are_told_at_once(tmp_path: Path) -> None:
-    """Every damaged row of one table is told with its line and column."""
-    lines = told(tmp_path, HEAD + "".join(row for row, _ in DAMAGED.values()))
-    for number, (name, (_, text)) in enumerate(DAMAGED.items(), start=2):
-        found = [line for line in lines if line.startswith(f"line {number}, ")]
-        assert found and text in found[0], (name, found)
-    assert {int(line.split()[1].strip(",:")) for line in lines} == set(range(2, len(DAMAGED) + 2))
-
-
-@pytest.mark.parametrize("name", HEADS)
-def test_damaged_tables_are_told(name: str, tmp_path: Path) -> None:
-    """What is wrong with a table as a whole."""
-    table, text = HEADS[name]
-    lines = told(tmp_path, table)
-    assert text in lines[0], lines
 
 
 def test_missing_file_and_idle_variables(tmp_path: Path) -> None:
