@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import pytest
 
 from run_cases import CASES, ROOT, Machine, run
@@ -38,6 +39,7 @@ def run_text(
     work: Path, case: str, *words: str, folder: str = ".", **settings
 ) -> subprocess.CompletedProcess[str]:
     """Write a case into a folder and run it, from there or from a folder in it, on one thread."""
+    work.mkdir(exist_ok=True)
     (work / "case.nml").write_text(case)
     return subprocess.run(
         [str(ROOT / "mics"), "--threads", "1", *words, str(work / "case.nml")],
@@ -48,3 +50,15 @@ def run_text(
         check=False,
         **settings,
     )
+
+
+def mics(work: Path, case: str, *words: str, **settings) -> subprocess.CompletedProcess[str]:
+    """A quiet run of a case."""
+    return run_text(work, case, "--quiet", *words, **settings)
+
+
+def results(work: Path, case: str) -> h5py.File:
+    """The results of a good run."""
+    done = mics(work, case)
+    assert done.returncode == 0, done.stderr
+    return h5py.File(work / "mics-out" / "run.h5")

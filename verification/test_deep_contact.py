@@ -1,34 +1,18 @@
 """Blocks at rest give way little, whatever the restitution and the load, and what goes through is
 told: stacks, heavy blocks on small ones, thin plates, plates that are driven into blocks."""
 
-import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from run_cases import ROOT
+from shared_runs import mics
 
-MICS = ROOT / "mics"
 HEAD = """&run t_end = {end}  dt = 0.005  physics = 'dry'  field_interval = 0 /
 &grid cells = 4, 4, 4  length = 0.3, 0.3, 0.3 /
 &shape name = 'c'  kind = 'cube'  size = {size}  density = 2300 /
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
-
-
-def run(work: Path, case: str, *options: str) -> subprocess.CompletedProcess[str]:
-    """The program on a case."""
-    (work / "case.nml").write_text(case)
-    return subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", *options, "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
 
 
 def end_of(work: Path) -> tuple[float, int, int]:
@@ -46,7 +30,7 @@ def test_stack_rests(e: str, gap: float, tmp_path: Path) -> None:
     case = HEAD.format(end=1.0, size=0.04) + f"&contact restitution = {e} /\n"
     for k in range(2):
         case += f"&body shape = 'c'  position = 0.15, 0.15, {0.02 + gap + k * (0.04 + gap)} /\n"
-    done = run(tmp_path, case)
+    done = mics(tmp_path, case)
     overlap, asleep, bodies = end_of(tmp_path)
     assert (done.returncode, done.stderr, asleep) == (0, "", bodies)
     assert overlap < 1e-4
@@ -62,7 +46,7 @@ def test_small_blocks_carry_a_heavy_one(size: float, tmp_path: Path) -> None:
         for y in (-1, 1):
             place = [0.15 + x * (0.05 - size), 0.15 + y * (0.05 - size), size / 2]
             case += "&body shape = 'c'  position = {}, {}, {} /\n".format(*place)
-    done = run(tmp_path, case)
+    done = mics(tmp_path, case)
     overlap, asleep, bodies = end_of(tmp_path)
     assert (done.returncode, done.stderr, asleep) == (0, "", bodies)
     assert overlap < 0.01 * size
@@ -76,7 +60,7 @@ def test_driven_plate_is_told(model: str, tmp_path: Path) -> None:
     case += "&shape name = 'p'  kind = 'box'  size = 0.1, 0.1, 0.02 /\n"
     case += "&body shape = 'c'  position = 0.15, 0.15, 0.02 /\n"
     case += "&body shape = 'p'  position = 0.15, 0.15, 0.055  fixed = T  velocity = 0, 0, -0.02 /\n"
-    done = run(tmp_path, case)
+    done = mics(tmp_path, case)
     warning, fault = done.stderr.splitlines()
     assert done.returncode == 3
     for line in (warning, fault):
@@ -100,7 +84,7 @@ def test_block_in_a_thin_plate_is_told(fixed: str, tmp_path: Path) -> None:
     case += f"&body shape = 'p'  position = 0.15, 0.15, {height}  fixed = {fixed} /\n"
     case += f"&body shape = 'c'  position = 0.15, 0.15, {height + 0.0405}  velocity = 0, 0, -7.7"
     case += "  axis = 1, 0.3, 0  angle_deg = 40 /\n"
-    done = run(tmp_path, case)
+    done = mics(tmp_path, case)
     overlap, _, _ = end_of(tmp_path)
     out_again = done.returncode == 0 and overlap < 0.05 * 0.001
     assert out_again or (done.returncode == 3 and "of the size of the smaller" in done.stderr)
@@ -122,7 +106,7 @@ def test_soft_blocks_are_warned_of(contact: str, told: str, tmp_path: Path) -> N
     """`--check` tells blocks that give way by more than 1 % of their size at rest."""
     case = HEAD.format(end=1.0, size=0.04) + f"&contact {contact} /\n"
     case += "&body shape = 'c'  position = 0.15, 0.15, 0.021 /\n"
-    done = run(tmp_path, case, "--check")
+    done = mics(tmp_path, case, "--check")
     warnings = [line for line in done.stdout.splitlines() if "&contact" in line]
     assert done.returncode == 0
     assert len(warnings) == (told != "")
@@ -134,8 +118,8 @@ def test_soft_supports_are_warned_of(tmp_path: Path) -> None:
     case = HEAD.format(end=1.0, size=0.01) + "&contact contact_time = 0.008 /\n"
     case += "&shape name = 'b'  kind = 'cube'  size = 0.1 /\n"
     case += "&body shape = 'c'  position = 0.15, 0.15, 0.006 /\n"
-    alone = run(tmp_path, case, "--check").stdout
+    alone = mics(tmp_path, case, "--check").stdout
     case += "&body shape = 'b'  position = 0.15, 0.15, 0.1 /\n"
-    done = run(tmp_path, case, "--check")
+    done = mics(tmp_path, case, "--check")
     assert "give way" not in alone
     assert "blocks c give way by" in done.stdout and "blocks b give way" not in done.stdout

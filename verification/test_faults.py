@@ -6,10 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from run_cases import ROOT
 from shared_runs import run_text
 
-MICS = ROOT / "mics"
 TANK = "&grid cells = 12, 12, 12  length = 1, 1, 1 /\n"
 LIGHT = """&run t_end = 0.03  dt = 0.01 /
 &fluid water_level = 0.5 /
@@ -20,7 +18,6 @@ DAM = """&run t_end = {t_end}  dt = {dt}  cfl_max = {cfl_max} /
 &fluid gas_density = 1.2 /
 &water min = 0, 0, 0  max = 0.3, 1, 0.6 /
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(work: Path, groups: str, tank: str = TANK) -> tuple[int, str]:

@@ -10,12 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
-from run_cases import CASES, ROOT
+from run_cases import CASES
 from same_bits import differences
 from shared_runs import run_text
-
-MICS = ROOT / "mics"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 WET = """&run t_end = {t_end}  dt = 0.01  restart_interval = 0.01  field_interval = 0.01 /
 &grid cells = 8, 8, 8  length = 1, 1, 1 /

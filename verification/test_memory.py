@@ -21,7 +21,6 @@ CASE = """&run t_end = 2.0e-3  dt = 1.0e-3  field_interval = 1 /
 &shape name = 'unit'  kind = 'hexapod'  size = 0.02 /
 &body shape = 'unit'  position = 0.05, 0.05, 0.06 /
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(

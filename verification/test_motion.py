@@ -8,11 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
+import shared_runs
 from measures.budget import Budget
 from micstools.reading.reader import Run
-from run_cases import ROOT
 
-MICS = ROOT / "mics"
 TANK = "&grid cells = 16, 8, 12  length = 0.16, 0.08, 0.12 /\n"
 DRY = "&run t_end = {end}  dt = 0.01  physics = 'dry'  field_interval = 0 /\n" + TANK
 WET = (
@@ -31,29 +30,20 @@ DOOR = (
     "time, x, y, z, qw, qx, qy, qz\n0, 0.05, 0.04, 0.05, 1, 0, 0, 0\n"
     "0.05, 0.07, 0.04, 0.055, 0.96, 0, 0.28, 0\n0.1, 0.08, 0.04, 0.05, 0.8, 0, 0.6, 0\n"
 )
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(work: Path, case: str, table: str, *options: str) -> subprocess.CompletedProcess[str]:
     """Run a case with its table beside it."""
     work.mkdir(exist_ok=True)
     (work / "way.csv").write_text(table)
-    (work / "case.nml").write_text(case)
-    return subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", *options, "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    return shared_runs.mics(work, case, *options)
 
 
-def run(work: Path, case: str, table: str, *options: str) -> h5py.File:
+def run(work: Path, case: str, table: str) -> h5py.File:
     """The results of a good run."""
-    done = mics(work, case, table, *options)
-    assert done.returncode == 0, done.stderr
-    return h5py.File(work / "mics-out" / "run.h5")
+    work.mkdir(exist_ok=True)
+    (work / "way.csv").write_text(table)
+    return shared_runs.results(work, case)
 
 
 @pytest.mark.parametrize("solver", ["springs", "impulses"])

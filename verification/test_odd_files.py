@@ -17,7 +17,6 @@ CASE = """&run t_end = 0.01  dt = 5.0e-3 /
 &fluid {fluid} /
 {groups}
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(work: Path, *words: str, text: str | None = None) -> subprocess.CompletedProcess[str]:

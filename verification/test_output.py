@@ -24,7 +24,6 @@ ALONE = Machine(MICS, threads=1)
 CASE = CASES / "ranks" / "coupled.nml"
 LONG = ROOT / "input" / "blocks_coarse.nml"
 GRAVITY = np.array([0.0, 0.0, -9.81])
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 T, N = "T", "N"
 BODY_ROWS = {

@@ -13,7 +13,6 @@ CASE = """&run t_end = 0.04  dt = 0.01  restart_interval = 0.01 /
 &grid cells = 8, 8, 8  length = 1, 1, 1 /
 &fluid water_level = 0.5 /
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(work: Path, *words: str, before: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:

@@ -1,15 +1,13 @@
 """Stones: a heap comes to rest without water, one falls in water, a drop draws each."""
 
-import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from run_cases import ROOT
+from shared_runs import results
 
-MICS = ROOT / "mics"
 STONES = "&shape name = 'rock'  kind = 'rock'  density = 2650  mass_50 = 0.1 /\n"
 HEAP = f"""&run t_end = 6  dt = 0.01  physics = 'dry'  stop_when_settled = T  field_interval = 0 /
 &grid cells = 6, 6, 20  length = 0.24, 0.24, 0.8 /
@@ -21,28 +19,11 @@ FALL = f"""&run t_end = 0.12  dt = 0.01  field_interval = 0.12 /
 &fluid water_level = 0.15 /
 {STONES}&body shape = 'rock-07'  position = 0.06, 0.06, 0.19  axis = 1, 2, 3  angle_deg = 40 /
 """
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
-
-
-def run(work: Path, case: str) -> h5py.File:
-    """The results of a run."""
-    work.mkdir(exist_ok=True)
-    (work / "case.nml").write_text(case)
-    done = subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return h5py.File(work / "mics-out" / "run.h5")
 
 
 def test_a_heap_settles(tmp_path: Path) -> None:
     """Twenty stones lie still, all in the tank, none deep in another; another seed draws others."""
-    with run(tmp_path, HEAP.format(seed=1)) as h5:
+    with results(tmp_path, HEAP.format(seed=1)) as h5:
         assert h5["bodies/time"][-1] < 6.0
         assert np.abs(h5["bodies/velocity"][-1]).max() < 1e-3
         place = h5["bodies/position"][-1]
@@ -58,7 +39,7 @@ def test_a_heap_settles(tmp_path: Path) -> None:
 
 def test_one_falls_in_water(tmp_path: Path) -> None:
     """The grid holds the volume of the stone, the books of liquid and momentum are closed."""
-    with run(tmp_path, FALL) as h5:
+    with results(tmp_path, FALL) as h5:
         b, dt = h5["bodies"], np.diff(h5["bodies/time"][:])
         force = b["fluid_force"][1:, 0] + b["contact_force"][1:, 0]
         gained = np.diff(b["velocity"][:, 0], axis=0) * b["mass"][0]
@@ -67,7 +48,7 @@ def test_one_falls_in_water(tmp_path: Path) -> None:
         assert np.abs(h5["series/liquid_volume_drift"][:]).max() < 1e-12
         assert b["position"][-1, 0, 2] < 0.15
     with h5py.File(tmp_path / "mics-out" / "fields.vtkhdf") as h5, \
-            h5py.File(tmp_path / "mics-out" / "run.h5") as results:  # fmt: skip
+            h5py.File(tmp_path / "mics-out" / "run.h5") as rows:  # fmt: skip
         solid = h5["VTKHDF/CellData/solid"][-1].sum() * 1e-6
-        volume = float(np.ravel(results["shapes/rock-07"].attrs["volume"])[0])
+        volume = float(np.ravel(rows["shapes/rock-07"].attrs["volume"])[0])
         assert solid == pytest.approx(volume, rel=1e-6)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from run_cases import ROOT
+from shared_runs import mics
 
 MICS = ROOT / "mics"
 RELEASED = 0.2
@@ -19,20 +20,11 @@ CASE = """&run t_end = 5  dt = 0.01  physics = 'dry'  stop_when_settled = {stop}
 """
 LATER = "&drop shape = 'c'  position = 0.3, 0.2, 0.06  count = 1  first_time = 2 /\n"
 ALL_AT_REST = "1 due block(s) never found room, and all others are at rest"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def run(work: Path, case: str) -> tuple[int, str, float]:
     """Exit code, messages and last time [s] of a run."""
-    (work / "case.nml").write_text(case)
-    done = subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = mics(work, case)
     with h5py.File(work / "mics-out" / "run.h5") as h5:
         told = int(np.ravel(h5["provenance"].attrs["exit_status"])[0])
         assert told == done.returncode

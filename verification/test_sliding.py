@@ -1,12 +1,10 @@
 """A box slides over two bars, flush: only friction slows it."""
 
-import subprocess
 from pathlib import Path
 
-import h5py
 import pytest
 
-from run_cases import ROOT
+from shared_runs import results
 
 SLOPE, FRICTION, G = 0.6, 0.5, 9.81
 DOWN = G / (1 + SLOPE**2) ** 0.5
@@ -26,10 +24,7 @@ CASE = f"""&run physics = 'dry'  t_end = 0.52  dt = 0.02 /
 @pytest.mark.parametrize("solver", ["springs", "impulses"])
 def test_only_friction_slows_a_box(solver: str, tmp_path: Path) -> None:
     """Over .1 m it gains g (sin - mu cos) t, within 1 %, and does not turn."""
-    (tmp_path / "case.nml").write_text(CASE.format(solver=solver))
-    words = [ROOT / "mics", "--quiet", "--threads", "1", "case.nml"]
-    subprocess.run(words, cwd=tmp_path, check=True, timeout=120)
-    with h5py.File(tmp_path / "mics-out" / "run.h5") as h5:
+    with results(tmp_path, CASE.format(solver=solver)) as h5:
         time, velocity, spin = (
             h5[f"bodies/{name}"][:] for name in ("time", "velocity", "angular_velocity")
         )

@@ -8,11 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from run_cases import ROOT
 from shared_runs import run_text
-
-MICS = ROOT / "mics"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 def mics(work: Path, case: str, *words: str) -> tuple[int, str, str]:

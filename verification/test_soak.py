@@ -21,7 +21,6 @@ from soak.shop import Shop, open_shop
 
 MICS, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 ALONE = Machine(MICS, 1, 1)
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
 @pytest.fixture(scope="module")

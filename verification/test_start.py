@@ -1,6 +1,5 @@
 """`&start`: blocks begin where another run left them; a split hopper filled dry opens in water."""
 
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -9,9 +8,8 @@ import pytest
 
 from measures.budget import Budget
 from micstools.reading.reader import Run
-from run_cases import ROOT
+from shared_runs import mics
 
-MICS = ROOT / "mics"
 GRID = "&grid cells = 12, 4, 12  length = 0.24, 0.08, 0.24 /\n"
 CUBE = "&shape name = 'cube'  kind = 'cube'  size = 0.03 /\n"
 THREE = (
@@ -20,19 +18,6 @@ THREE = (
 )
 FILL = "&run t_end = 0.5  dt = 0.01  physics = 'dry'  output = 'fill'  field_interval = 0 /\n"
 THEN = "&run t_end = 0.1  dt = 0.01  physics = 'dry'  output = 'then'  field_interval = 0 /\n"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
-
-
-def mics(work: Path, case: str, *options: str) -> subprocess.CompletedProcess[str]:
-    (work / "case.nml").write_text(case)
-    return subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", *options, "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")

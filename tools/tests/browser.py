@@ -8,6 +8,7 @@ import select
 import shutil
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -167,6 +168,17 @@ class Browser:
     def mouse(self, kind: str, x: float, y: float, **more: Any) -> None:
         """Move or press the mouse."""
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+
+    def drag(self, p: Sequence[float], q: Sequence[float]) -> None:
+        """Press the left button at p, let go at q; until what follows is drawn."""
+        self.mouse("mousePressed", *p, button="left", buttons=1, clickCount=1)
+        self.mouse("mouseMoved", *q, button="left", buttons=1)
+        self.mouse("mouseReleased", *q, button="left")
+        self.settle()
+
+    def settle(self) -> None:
+        """Wait until what was asked for is drawn."""
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def picture(self, path: Path | None = None, whole: bool = False) -> bytes:
         """The window, or the whole page, as a PNG."""

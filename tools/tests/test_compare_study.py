@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli
+from calls import mics_tools
 from micstools.cases.convergence import converge
 from micstools.commands.study import finer
 from micstools.reading import comparison
@@ -20,10 +20,8 @@ END = np.array([0.2, 0.05, 0.1])
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as end:
-        cli.main(list(words))
-    said = capsys.readouterr()
-    return int(str(end.value.code)), said.out, said.err
+    code, said = mics_tools(words), capsys.readouterr()
+    return code, said.out, said.err
 
 
 @pytest.fixture
@@ -127,6 +125,7 @@ if "--check" in words:
     sys.exit("mics: &grid cells: too many" if "9999" in sys.stdin.read() else 0)
 import h5py
 import numpy as np
+from calls import mics_tools
 from synthetic import UPRIGHT, Motion, write_run
 from micstools.cases import settings
 n = settings.value(Path(words[-1]).read_text(), "grid", "cells")[0]

@@ -19,7 +19,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from micstools import cli
+from calls import mics_tools
 from micstools.cases import settings
 from micstools.cases.program import find as find_program
 from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
@@ -75,9 +75,7 @@ def program(tmp_path: Path) -> Path:
 
 def call(program: Path, *words: str) -> int:
     case = str(program.parent / "case.nml")
-    with pytest.raises(SystemExit) as end:
-        cli.main(["ensemble", case, "--program", str(program), *words])
-    return int(str(end.value.code))
+    return mics_tools(["ensemble", case, "--program", str(program), *words])
 
 
 def outcomes(folder: Path) -> list[str]:
@@ -515,9 +513,7 @@ def test_a_file_beside_the_case_is_found_from_its_copies(
         CASE + "&shape name = 'a' kind = 'file' file = 'block.txt' /\n&bed file = 'mound.txt' /\n"
     )
     words = ("ensemble", str(case), "--program", str(program), "--runs", "1", "--slurm")
-    with pytest.raises(SystemExit) as ended:
-        cli.main([*words, "--out", "out"])
-    assert ended.value.code == 0
+    assert mics_tools([*words, "--out", "out"]) == 0
     copy = Path("out/0001/case.nml").read_text()
     assert settings.value(copy, "shape", "file") == "study/block.txt"
     assert settings.value(copy, "bed", "file") == "mound.txt"

@@ -3,29 +3,24 @@
 import base64
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from browser import MISSING, Browser
-from micstools import cli
+from browser import Browser
+from calls import mics_tools
 from micstools.pages import charts, ensemble_page
 from micstools.piles import pile_ensemble
 from test_page import OUT_OF_TILES
 from test_pile_ensemble import ENDS, HALF, HEXAPOD, WAITING, write_ensemble
 
-in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
-
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = write_ensemble(tmp_path_factory.mktemp("page") / "piles", ENDS * 2, paper=True)
-    with pytest.raises(SystemExit) as end:
-        cli.main(["report", str(folder)])
-    assert end.value.code == 0
+    assert mics_tools(["report", str(folder)]) == 0
     return folder / "report.html"
 
 
@@ -147,13 +142,6 @@ def test_values_that_differ_by_rounding_are_one_bar() -> None:
     assert low < 39 and high > 41
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as found:
-        yield found
-
-
-@in_browser
 def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
     browser.open(report)
     for number in (1, 4):
@@ -171,10 +159,8 @@ def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
     assert [url for url in browser.requests if not url.startswith("data:")] == [report.as_uri()]
 
 
-@in_browser
 @pytest.mark.parametrize("dark", [False, True])
 def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
     browser.open(report, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
     assert browser.run(OUT_OF_TILES.replace(".facts div", ".wall button")) == []
-    assert browser.errors == []

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from micstools import cli
+from calls import mics_tools
 from micstools.pictures import exports, scene
 from micstools.reading.reader import Run
 from synthetic import Motion, write_run
@@ -34,11 +34,10 @@ def test_the_table_holds_every_row(loose_pile: Run, tmp_path: Path) -> None:
 def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
     run = make_run(Motion(t_end=2.0, field_step=2.0))  # too late for the third and later ones
     b = run.bodies
-    with pytest.raises(SystemExit) as end:
-        cli.main(["export", str(run.folder), "--to", "csv", "--final"])
+    assert mics_tools(["export", str(run.folder), "--to", "csv", "--final"]) == 0
     said = capsys.readouterr()
     path = run.folder / "export" / "final.csv"
-    assert end.value.code == 0 and said.out == f"{path}\n"
+    assert said.out == f"{path}\n"
     assert "left out, not released by the end: 6, 7, 8, 9" in said.err
     assert not (run.folder / "export" / "blocks.csv").exists()
     with path.open() as file:
@@ -158,9 +157,7 @@ def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) 
      (["--to", "stl", "--final"], "--final is of csv")],
 )  # fmt: skip
 def test_wrong_wishes_are_one_line(loose_pile: Run, words: list[str], said: str, capsys) -> None:
-    with pytest.raises(SystemExit) as end:
-        cli.main(["export", str(loose_pile.folder), *words])
-    assert end.value.code == 2
+    assert mics_tools(["export", str(loose_pile.folder), *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
 

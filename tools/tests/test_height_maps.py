@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image, TiffImagePlugin
 
-from micstools import cli
+from calls import mics_tools
 from micstools.reading.reader import BadRun
 from micstools.shapes import height_maps
 
@@ -177,16 +177,12 @@ def test_a_doubtful_height_is_asked_about(
         z = np.where(Z == 12, float(height), Z).astype(np.float32)
         path = geotiff(tmp_path / "a.tif", z, AREA, tags={**SCALE, 42113: "-99"})
     words = ["bed", str(path), "--out", str(tmp_path / "bed.txt")]
-    with pytest.raises(SystemExit) as end:
-        cli.main(words)
-    assert end.value.code == 2
+    assert mics_tools(words) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "1 of 12 points have doubtful heights" in line and " at 105, 203: " in line
     assert "--nodata=" + height[0] in line and not (tmp_path / "bed.txt").exists()
     for more in ([f"--nodata={height}", "--fill", "12"], ["--window", "101,201,103,203"]):
-        with pytest.raises(SystemExit) as end:
-            cli.main([*words, *more])
-        assert end.value.code == 0
+        assert mics_tools([*words, *more]) == 0
 
 
 @pytest.mark.parametrize(
@@ -236,9 +232,7 @@ def test_what_is_no_map_is_one_line(
     tmp_path: Path, name: str, text: str, said: str, capsys
 ) -> None:
     words = [str(save(tmp_path / name, text)), "--out", str(tmp_path / "bed.txt")]
-    with pytest.raises(SystemExit) as end:
-        cli.main(["bed", *words])
-    assert end.value.code == 2
+    assert mics_tools(["bed", *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
     assert not (tmp_path / "bed.txt").exists()
@@ -256,9 +250,7 @@ def test_what_is_no_map_is_one_line(
 )
 def test_wrong_wishes_are_one_line(tmp_path: Path, words: list[str], said: str, capsys) -> None:
     path = save(tmp_path / "a.asc", ESRI)
-    with pytest.raises(SystemExit) as end:
-        cli.main(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words])
-    assert end.value.code == 2
+    assert mics_tools(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words]) == 2
     assert said in capsys.readouterr().err
 
 
@@ -266,9 +258,12 @@ def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
     """A model at 1:50 of a part of the map, its gap filled, under a tank of 60 x 40 mm."""
     path = save(tmp_path / "a.asc", ESRI.replace("12", "-99"))
     words = ["--fill", "12.5", "--window", "101.5,201.5,104.5,203.5", "--origin", "101.5,201.5,0"]
-    with pytest.raises(SystemExit) as end:
-        cli.main(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words, "--scale", "0.02"])
-    assert end.value.code == 0
+    assert (
+        mics_tools(
+            ["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words, "--scale", "0.02"]
+        )
+        == 0
+    )
     assert "filled    1 points with 12.5 m" in capsys.readouterr().out
     lines = (tmp_path / "bed.txt").read_text().splitlines()
     assert lines[1:] == [

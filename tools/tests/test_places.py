@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli
+from calls import mics_tools
 from micstools.piles import handover, places
 from micstools.piles.places import Survey
 from micstools.reading.reader import Run
@@ -184,9 +184,7 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     ezdxf = pytest.importorskip("ezdxf")
     words = ["places", str(run.folder), "--to", "csv,geojson,dxf,asc", "--out", str(tmp_path),
              "--origin", "354200,5621080,-12.5", "--crs", "EPSG:25832"]  # fmt: skip
-    with pytest.raises(SystemExit) as end:
-        cli.main(words)
-    assert end.value.code == 0
+    assert mics_tools(words) == 0
     said = capsys.readouterr().out
     assert "4 free units, 4 of them at rest" in said and "per 100 cm2" in said
     table = pandas.read_csv(tmp_path / "places.csv")
@@ -236,9 +234,7 @@ def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:
     geopandas = pytest.importorskip("geopandas")
     folder = write_ensemble(tmp_path / "ensemble")
     words = ["places", str(folder), "--to", "csv,geojson,dxf,asc", "--origin", "100,200,0"]
-    with pytest.raises(SystemExit) as end:
-        cli.main([*words, "--tolerance", "0.112"])
-    assert end.value.code == 0, capsys.readouterr().err
+    assert mics_tools([*words, "--tolerance", "0.112"]) == 0
     rows = list(csv.DictReader((folder / "places.csv").open()))
     assert [r["run"] for r in rows if r["unit"] == "4"] == ["1", "2", "3", "4", "5", "6"]
     (landing, *_) = csv.DictReader((folder / "landings.csv").open())
@@ -273,9 +269,8 @@ def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:
     ],
 )
 def test_wrong_words_are_told(run: Run, words: list[str], said: str, tmp_path, capsys) -> None:
-    with pytest.raises(SystemExit) as end:
-        cli.main(["places", str(run.folder), *words, "--out", str(tmp_path / "new")])
-    assert end.value.code == 2 and said in capsys.readouterr().err
+    assert mics_tools(["places", str(run.folder), *words, "--out", str(tmp_path / "new")]) == 2
+    assert said in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from browser import MISSING, Browser
-from micstools import cli
+from browser import Browser
+from calls import mics_tools
 from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import SetUp
 from micstools.reading import units
@@ -21,7 +21,6 @@ from test_page import scene_of
 
 ROOT = Path(__file__).parents[2]
 MICS = ROOT / "mics"
-in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 pytestmark = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
 CASE = """&run t_end = 8  dt = 0.02  title = '<i>Crane</i> and pusher' /
 &grid cells = 48, 24, 16  length = 24, 12, 8 /
@@ -46,17 +45,9 @@ def found() -> Iterator[SetUp]:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     case = tmp_path_factory.mktemp("plan") / "crane.nml"
     case.write_text(CASE)
-    with pytest.raises(SystemExit) as end:
-        cli.main(["check", str(case), "--program", str(MICS), "--page"])
-    assert end.value.code == 0
+    assert mics_tools(["check", str(case), "--program", str(MICS), "--page"]) == 0
     assert sorted(p.name for p in case.parent.iterdir()) == ["check.html", "crane.nml"]
     return case.with_name("check.html")
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as found:
-        yield found
 
 
 def test_the_program_tells_what_comes(found: SetUp) -> None:
@@ -147,10 +138,8 @@ def test_the_plan_is_told_in_words(found: SetUp, page: Path) -> None:
 def test_a_refused_case_is_told_and_nothing_written(tmp_path: Path, capfd) -> None:
     case = tmp_path / "case.nml"
     case.write_text(CASE.replace("size = 1.0", "size = -1.0"))
-    with pytest.raises(SystemExit) as end:
-        cli.main(["check", str(case), "--program", str(MICS), "--page"])
+    assert mics_tools(["check", str(case), "--program", str(MICS), "--page"]) == 2
     said = capfd.readouterr().err
-    assert end.value.code == 2
     assert said.startswith("mics: &shape size = -1") and "(line 5)" in said
     assert [p.name for p in tmp_path.iterdir()] == ["case.nml"]
     remark = set_up.Refused(said, case.read_text()).remarks[0]
@@ -158,20 +147,10 @@ def test_a_refused_case_is_told_and_nothing_written(tmp_path: Path, capfd) -> No
 
 
 def test_out_goes_with_page(tmp_path: Path, capsys) -> None:
-    with pytest.raises(SystemExit) as end:
-        cli.main(["check", "case.nml", "--out", str(tmp_path / "a.html")])
-    assert end.value.code == 2 and "--out: goes with --page" in capsys.readouterr().err
+    assert mics_tools(["check", "case.nml", "--out", str(tmp_path / "a.html")]) == 2
+    assert "--out: goes with --page" in capsys.readouterr().err
 
 
-def drag(browser: Browser, p: tuple[float, float], q: tuple[float, float]) -> None:
-    """Presses, moves and lets go the left button."""
-    browser.mouse("mousePressed", *p, button="left", buttons=1, clickCount=1)
-    browser.mouse("mouseMoved", *q, button="left", buttons=1)
-    browser.mouse("mouseReleased", *q, button="left")
-    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-@in_browser
 def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     """It turns, marks a warning, lets blocks come; it loads nothing, and nothing fails."""
     browser.open(page)
@@ -180,7 +159,7 @@ def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
         "(r => [r.x + r.width / 2, r.y + r.height / 2])"
         "(document.querySelector('.stage').getBoundingClientRect())"
     )
-    drag(browser, (x, y), (x + 80, y))
+    browser.drag((x, y), (x + 80, y))
     assert browser.run("planPlayer.stage.yaw") == pytest.approx(yaw - 0.5)
     numbers = browser.run("planPlayer.plan.marks.map(m => m.number)")
     assert set(numbers) == {mark["number"] for mark in scene_of(page)["plan"]["marks"]}
@@ -194,15 +173,13 @@ def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     assert "3: 0 s" in labels
     before = browser.picture()
     browser.run("document.querySelector('.cells').click()")
-    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    browser.settle()
     assert browser.picture() != before
     assert browser.errors == []
     assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
 
 
-@in_browser
 @pytest.mark.parametrize("dark", [False, True])
 def test_it_fits_a_phone(browser: Browser, page: Path, dark: bool) -> None:
     browser.open(page, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
-    assert browser.errors == []

@@ -3,7 +3,7 @@ paths, paces, and the speed of the water."""
 
 import base64
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from browser import MISSING, Browser
-from micstools import cli
+from browser import Browser
+from calls import mics_tools
 from micstools.pages import motion, parts, run_page
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 from synthetic import UPRIGHT, Motion, write_run
 
-in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 FLAT = {"front": (0, 2), "side": (1, 2), "top": (0, 1)}
 
 
@@ -109,16 +108,8 @@ def test_north_is_given_or_said_to_be_y(make_run, capsys) -> None:
     assert parts.NORTH_IS_Y in run_page.page(run)
     page = run_page.page(run, 30.0)
     assert parts.NORTH_IS_Y not in page and '"north":30.0' in page
-    with pytest.raises(SystemExit) as end:
-        cli.main(["report", str(run.folder), "--north", "400"])
-    assert end.value.code == 2
+    assert mics_tools(["report", str(run.folder), "--north", "400"]) == 2
     assert "--north 400.0: must be degrees" in capsys.readouterr().err
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -126,14 +117,9 @@ def page(loose_pile: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return save(loose_pile, tmp_path_factory.mktemp("player") / "page.html", north=90.0)
 
 
-def settled(browser: Browser) -> None:
-    """Until what was asked for is drawn."""
-    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
 def view(browser: Browser, name: str) -> None:
     browser.run(f"document.querySelector('[data-view={name}]').click()")
-    settled(browser)
+    browser.settle()
 
 
 def choose(browser: Browser, name: str, value: object) -> None:
@@ -141,7 +127,7 @@ def choose(browser: Browser, name: str, value: object) -> None:
         f"(s => {{ s.value = '{value}'; s.dispatchEvent(new Event('change')); }})"
         f"(document.querySelector('.{name}'))"
     )
-    settled(browser)
+    browser.settle()
 
 
 def at(browser: Browser, point: list[float]) -> tuple[float, float]:
@@ -162,7 +148,6 @@ def pixels(browser: Browser, *places: tuple[float, float]) -> np.ndarray:
     return np.array([window[round(top + y), round(left + x)] for x, y in places])
 
 
-@in_browser
 @pytest.mark.parametrize("name", FLAT)
 def test_flat_views_are_to_scale(browser: Browser, page: Path, name: str) -> None:
     browser.open(page)
@@ -180,10 +165,8 @@ def test_flat_views_are_to_scale(browser: Browser, page: Path, name: str) -> Non
     scale = pixels / length
     assert q[0] - p[0] == pytest.approx(0.03 * scale, rel=1e-4)
     assert p[1] - q[1] == pytest.approx(0.04 * scale, rel=1e-4)
-    assert browser.errors == []
 
 
-@in_browser
 def test_a_length_is_measured(browser: Browser, page: Path) -> None:
     browser.open(page)
     view(browser, "top")
@@ -193,10 +176,7 @@ def test_a_length_is_measured(browser: Browser, page: Path) -> None:
         for point in ([0.05, 0.02, 0.0], [0.20, 0.08, 0.0])
     )
     yaw = browser.run("runPlayer.stage.yaw")
-    browser.mouse("mousePressed", *p, button="left", buttons=1, clickCount=1)
-    browser.mouse("mouseMoved", *q, button="left", buttons=1)
-    browser.mouse("mouseReleased", *q, button="left")
-    settled(browser)
+    browser.drag(p, q)
     told = browser.run("runPlayer.stage.overlay.told")
     length = float(told.split(" mm")[0])
     assert length == pytest.approx(161.6, abs=1.0) and "Δx" in told and "Δy" in told
@@ -204,11 +184,9 @@ def test_a_length_is_measured(browser: Browser, page: Path) -> None:
     view(browser, "corner")
     assert browser.run("runPlayer.stage.measured") is None
     browser.mouse("mouseMoved", *p)
-    settled(browser)
-    assert browser.errors == []
+    browser.settle()
 
 
-@in_browser
 def test_places_are_those_of_a_survey(browser: Browser, tmp_path: Path) -> None:
     """What is pointed at is told to the centimetre, where single precision knows half a metre."""
     corner = np.array([354200.0, 5621080.0, -12.0])
@@ -218,14 +196,12 @@ def test_places_are_those_of_a_survey(browser: Browser, tmp_path: Path) -> None:
     box = browser.run("(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())")
     seen = [p + edge for p, edge in zip(at(browser, [5.0, 2.0, 0.0]), box, strict=True)]
     browser.mouse("mouseMoved", *seen)
-    settled(browser)
+    browser.settle()
     x, y = (float(v.split()[1]) for v in browser.run("runPlayer.stage.overlay.told").split(","))
     pixel = browser.run("2 * runPlayer.stage.half / runPlayer.stage.canvas.clientHeight")
     assert abs(x - 354205) < pixel and abs(y - 5621082) < pixel
-    assert browser.errors == []
 
 
-@in_browser
 def test_lengths_have_the_unit_of_the_page(browser: Browser, page: Path) -> None:
     """What is below a metre is told in m beside blocks of metres, as all else on the page."""
     browser.open(page)
@@ -233,7 +209,6 @@ def test_lengths_have_the_unit_of_the_page(browser: Browser, page: Path) -> None
     assert browser.run("inWords(0.4, { name: 'm', size: 1 })") == "0.4 m"
 
 
-@in_browser
 @pytest.mark.parametrize("name", ["corner", *FLAT])
 def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> None:
     """The block lies in a hole of the bed, and a roof of the bed is over it."""
@@ -250,13 +225,11 @@ def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> No
     for colour in ("#ff0000", "#00ff00"):
         browser.run(f"runPlayer.stage.scene.bodies[3].colour = '{colour}'")
         browser.run("runPlayer.stage.draw()")
-        settled(browser)
+        browser.settle()
         seen.append(pixels(browser, (x, y))[0])
     assert seen[0][0] > seen[0][1] + 40 and seen[1][1] > seen[1][0] + 40, seen
-    assert browser.errors == []
 
 
-@in_browser
 @pytest.mark.parametrize("wall", [False, True])
 def test_no_wall_hides_a_block(browser: Browser, tmp_path: Path, wall: bool) -> None:
     """A fixed body before a block hides it, unless it is a wall."""
@@ -271,13 +244,11 @@ def test_no_wall_hides_a_block(browser: Browser, tmp_path: Path, wall: bool) -> 
     for colour in ("#ff0000", "#00ff00"):
         browser.run(f"runPlayer.stage.scene.bodies[3].colour = '{colour}'")
         browser.run("runPlayer.stage.draw()")
-        settled(browser)
+        browser.settle()
         seen.append(pixels(browser, at(browser, [0.093, 0.08, 0.033]))[0])
     assert bool(np.abs(seen[0] - seen[1]).max() > 60) is wall
-    assert browser.errors == []
 
 
-@in_browser
 @pytest.mark.parametrize("name", ["corner", *FLAT])
 def test_a_moment_always_looks_the_same(browser: Browser, page: Path, name: str) -> None:
     """Edges of blocks and tank neither come and go nor move."""
@@ -287,13 +258,11 @@ def test_a_moment_always_looks_the_same(browser: Browser, page: Path, name: str)
     seen = set()
     for _ in range(6):
         browser.run("runPlayer.stage.draw()")
-        settled(browser)
+        browser.settle()
         seen.add(browser.picture())
     assert len(seen) == 1
-    assert browser.errors == []
 
 
-@in_browser
 def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) -> None:
     """A bed at the height of the floor is drawn whole from wherever one looks."""
     folder = write_run(tmp_path / "run", Motion(t_end=0.1))
@@ -304,14 +273,12 @@ def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) 
         browser.run(f"runPlayer.stage.yaw = {yaw}; runPlayer.stage.pitch = 0.4")
         browser.run("runPlayer.stage.scene.bodies.forEach(body => { body.release = null; })")
         browser.run("runPlayer.stage.draw()")
-        settled(browser)
+        browser.settle()
         places = [at(browser, [x, 0.01, 0.0]) for x in np.linspace(0.02, 0.28, 40)]
         colours = pixels(browser, *places)
         assert np.ptp(colours, axis=0).max() <= 2, yaw
-    assert browser.errors == []
 
 
-@in_browser
 def test_a_block_crosses_a_periodic_side(browser: Browser, page: Path) -> None:
     """Between two frames it does not fly back through the tank."""
     browser.open(page)
@@ -324,7 +291,6 @@ def test_a_block_crosses_a_periodic_side(browser: Browser, page: Path) -> None:
     assert found == pytest.approx([0.2975, 0.005, 0.0125], abs=1e-6)
 
 
-@in_browser
 def test_numbers_stand_on_their_blocks(browser: Browser, page: Path) -> None:
     browser.open(page)
     browser.run("runPlayer.show(8)")
@@ -341,9 +307,8 @@ def test_numbers_stand_on_their_blocks(browser: Browser, page: Path) -> None:
             )
             assert on == number
     browser.run("document.querySelector('.numbers').click()")
-    settled(browser)
+    browser.settle()
     assert browser.run("runPlayer.stage.seen") is None
-    assert browser.errors == []
 
 
 INK = """(() => {
@@ -355,23 +320,20 @@ INK = """(() => {
 })()"""
 
 
-@in_browser
 def test_a_path_is_drawn(browser: Browser, page: Path) -> None:
     browser.open(page)
     browser.run("runPlayer.show(6)")
     choose(browser, "follow", 5)
     browser.run("document.querySelector('.numbers').click()")
-    settled(browser)
+    browser.settle()
     bare = browser.run(INK)
     browser.run("document.querySelector('.paths').click()")
-    settled(browser)
+    browser.settle()
     one = browser.run(INK)
     choose(browser, "follow", "")
     assert one > bare + 50 and browser.run(INK) > bare + 50
-    assert browser.errors == []
 
 
-@in_browser
 def test_the_whole_run_passes_in_ten_seconds(browser: Browser, page: Path, tmp_path: Path) -> None:
     paces = "[...document.querySelector('.pace').options].map(o => +o.value)"
     browser.open(page)
@@ -383,7 +345,6 @@ def test_the_whole_run_passes_in_ten_seconds(browser: Browser, page: Path, tmp_p
     assert "all in 10 s" in browser.run("document.querySelector('.pace').textContent")
 
 
-@in_browser
 def test_the_water_is_coloured_by_its_speed(browser: Browser, page: Path) -> None:
     browser.open(page)
     browser.run("runPlayer.show(2.1)")
@@ -398,16 +359,13 @@ def test_the_water_is_coloured_by_its_speed(browser: Browser, page: Path) -> Non
     for name in FLAT:
         assert np.abs(seen["none", name] - seen["clear", name]).max() > 10
         assert np.abs(seen["speed", name] - seen["clear", name]).max() > 10, name
-    assert browser.errors == []
 
 
-@in_browser
 def test_north_is_where_it_was_said_to_be(browser: Browser, page: Path) -> None:
     browser.open(page)
     assert browser.run("runPlayer.stage.overlay.north") == pytest.approx([1, 0, 0], abs=1e-12)
 
 
-@in_browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("name", ["corner", *FLAT])
 def test_it_fits_a_phone(browser: Browser, page: Path, name: str, dark: bool) -> None:
@@ -417,4 +375,3 @@ def test_it_fits_a_phone(browser: Browser, page: Path, name: str, dark: bool) ->
     assert browser.run("runPlayer.stage.overlay.canvas.width") == browser.run(
         "runPlayer.stage.canvas.width"
     )
-    assert browser.errors == []
