@@ -23,6 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from micstools import files
 from micstools.cases import case_copy, program, settings
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.schema import schema, variables
@@ -235,7 +236,7 @@ class Case:
     def write(self, path: str | Path) -> Path:
         """Write the case; files that it names are then looked for beside it, or where we are."""
         path = Path(path)
-        path.write_text(self.text)
+        files.write(path, self.text)
         return path
 
     def _here(self) -> str:

@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from micstools import files
 from micstools.cases import program
 from micstools.commands.base import Command
 from micstools.commands.report import NORTH_HELP, check_north
@@ -35,7 +36,7 @@ def _check(given: argparse.Namespace) -> int:
         print(refused, file=sys.stderr)  # in the program's own words
         return 2
     path = given.out or given.case.with_name("check.html")
-    path.write_text(said, encoding="utf-8")
+    files.write(path, said)
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")
     return 0
 

@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from micstools import command
+from micstools import command, files
 from micstools.commands.base import Command
 from micstools.piles import layer, maps, pile, pile_ensemble, pile_form, pile_numbers, placing
 from micstools.piles.pile_ensemble import Ensemble
@@ -165,7 +165,7 @@ def _write_h5(path: Path, found: dict[str, Array]) -> None:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(known(content), indent=2, allow_nan=False) + "\n")
+    files.write(path, json.dumps(known(content), indent=2, allow_nan=False) + "\n")
     print(path)
 
 

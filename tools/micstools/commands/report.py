@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from micstools import command
+from micstools import command, files
 from micstools.commands.base import Command
 from micstools.commands.pile import add_area, area_of
 from micstools.pages import ensemble_page, run_page
@@ -40,7 +40,7 @@ def _report(given: argparse.Namespace) -> int:
         run = command.open_run(given.run)
         folder, text = run.folder, run_page.page(run, given.north)
     path = given.out or folder / "report.html"
-    path.write_text(text, encoding="utf-8")
+    files.write(path, text)
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")
     return 0
 

@@ -4,9 +4,10 @@ import csv
 import json
 from collections import Counter
 from collections.abc import Mapping
-from pathlib import Path
+from io import StringIO
 from typing import Any
 
+from micstools import files
 from micstools.ensembles.ensemble import OUTCOMES, Member, Plan, State
 from micstools.piles.shares import in_words, wilson
 
@@ -54,12 +55,11 @@ def sentence(table: Table) -> str:
 def write(plan: Plan, table: Table) -> None:
     """Write `ensemble.csv` and `ensemble.json`, each as a whole or not at all."""
     found = rows(table)
-    new = plan.folder / "ensemble.csv.new"
-    with new.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(found[0]), lineterminator="\n")
+    with StringIO() as text:
+        writer = csv.DictWriter(text, list(found[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(found)
-    new.replace(plan.folder / "ensemble.csv")
+        files.write(plan.folder / "ensemble.csv", text.getvalue())
     content = {
         "format": "mics-ensemble",
         "format_version": 1,
@@ -72,10 +72,4 @@ def write(plan: Plan, table: Table) -> None:
         "outcomes": shares(table),
         "table": found,
     }
-    _replace(plan.folder / "ensemble.json", json.dumps(content, indent=2) + "\n")
-
-
-def _replace(path: Path, text: str) -> None:
-    new = path.with_name(path.name + ".new")
-    new.write_text(text)
-    new.replace(path)
+    files.write(plan.folder / "ensemble.json", json.dumps(content, indent=2) + "\n")

@@ -1,0 +1,64 @@
+"""Writes text files whole or not at all."""
+
+import contextlib
+import os
+import secrets
+import shutil
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+
+def write(path: Path, text: str) -> None:
+    """Write a text file so that a crash or a full disk leaves the old or the new one. Links stay
+    links, and mode and owner stay those of the file that was there: one that a new file cannot
+    stand for (of another owner, of several names, in a closed folder) is written in place."""
+    place, content = path.resolve(), text.encode()
+    old = place.stat() if place.exists() else None
+    if old and not stat.S_ISREG(old.st_mode):  # a terminal, a pipe
+        place.write_bytes(content)
+        return
+    new = place.with_name(f".mics-{secrets.token_hex(8)}")
+    try:
+        with open(new, "xb", opener=lambda name, flags: os.open(name, flags, _mode(old))) as file:  # noqa: PTH123 - for its opener
+            _put(file, content)
+        if old is None or _stands_for(new, place, old):
+            new.replace(place)
+            _settle(place.parent)
+            return
+    except PermissionError:
+        if old is None:
+            raise
+    finally:
+        new.unlink(missing_ok=True)
+    with place.open("r+b") as file:
+        _put(file, content)
+
+
+def _settle(folder: Path) -> None:
+    """Let the new name outlive a power cut."""
+    entry = os.open(folder, os.O_RDONLY)
+    with contextlib.suppress(OSError):  # some file systems settle no folder
+        os.fsync(entry)
+    os.close(entry)
+
+
+def _mode(old: os.stat_result | None) -> int:
+    return stat.S_IMODE(old.st_mode) if old else 0o666
+
+
+def _put(file: BinaryIO, content: bytes) -> None:
+    file.write(content)
+    file.truncate()
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _stands_for(new: Path, place: Path, old: os.stat_result) -> bool:
+    """Has the new file all that the old one has, but its content?"""
+    with contextlib.suppress(PermissionError):
+        os.chown(new, old.st_uid, old.st_gid)
+    shutil.copystat(place, new)
+    os.utime(new)
+    now = new.stat()
+    return (now.st_uid, now.st_gid, 1) == (old.st_uid, old.st_gid, old.st_nlink)
