@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,9 @@ import pytest
 pytest.importorskip("aiohttp", reason="no aiohttp here: tools/deps.sh serve")
 
 from aiohttp import web  # noqa: E402
+from hypothesis import given  # noqa: E402
+from hypothesis import settings as settings_of_hypothesis  # noqa: E402
+from hypothesis import strategies as st  # noqa: E402
 
 from browser import MISSING, Browser  # noqa: E402
 from micstools.cases import settings  # noqa: E402
@@ -53,7 +58,7 @@ CASE = """! a remark that stays
 def serving(site: Site) -> Iterator[str]:
     """The site in a thread; the address with its key."""
     loop = asyncio.new_event_loop()
-    runner = web.AppRunner(site.app(), access_log=None)
+    runner = site.runner()
 
     async def begin() -> None:
         await runner.setup()
@@ -241,11 +246,89 @@ def test_a_private_file_leads_to_the_page(run_site: Site, browser: Browser, tmp_
 
 def test_only_loopback_listens(run_site: Site) -> None:
     """Another address of this machine has nobody at the port."""
-    import socket
-
     with socket.socket() as link:
         link.settimeout(2)
         assert link.connect_ex(("127.0.0.2", run_site.port)) != 0
+
+
+def send(site: Site, content: bytes, patience: float = 60) -> bytes:
+    """What comes back of raw bytes, with cookie and token."""
+    ours = f"Cookie: {site.cookie}={site.session}\r\n{TOKEN}: {site.token}\r\n"
+    with socket.create_connection((ADDRESS, site.port), patience) as link:
+        link.sendall(content.replace(b"OURS", f"Host: {ADDRESS}:{site.port}\r\n{ours}".encode()))
+        return b"".join(iter(lambda: link.recv(1 << 16), b""))
+
+
+def posted(body: bytes, length: int | None = None) -> bytes:
+    size = len(body) if length is None else length
+    head = f"POST /stop HTTP/1.1\r\nOURSConnection: close\r\nContent-Length: {size}\r\n\r\n"
+    return head.encode() + body
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[1]",
+        b'"x"',
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b'{"how": NaN}',
+        b'{"how": "\\ud800"}',
+    ],
+)
+def test_a_broken_request_is_told_in_a_line(run_site: Site, body: bytes) -> None:
+    answer = send(run_site, posted(body))
+    assert answer.startswith(b"HTTP/1.1 400 ")
+    assert answer.endswith((b"the request is no JSON", b"the request is no object"))
+
+
+def test_huge_odd_and_slow_requests_are_refused(
+    run_site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert send(run_site, posted(b"1" * 8_000_001)).startswith(b"HTTP/1.1 413 ")
+    for cookie in ("\udcff", "a=b; ;;=", f"{run_site.cookie}=\xff\udc80"):
+        headers = f"Host: {ADDRESS}:{run_site.port}\r\nCookie: {cookie}\r\nConnection: close"
+        raw = f"GET / HTTP/1.1\r\n{headers}\r\n\r\n".encode("utf-8", "surrogateescape")
+        assert send(run_site, raw).startswith((b"HTTP/1.1 403 ", b"HTTP/1.1 400 ")), cookie
+    monkeypatch.setattr(server, "_PATIENCE", 0.3)
+    assert send(run_site, posted(b"{", 10)).startswith(b"HTTP/1.1 408 ")
+
+
+def test_a_client_that_says_nothing_is_let_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "_PATIENCE", 0.3)
+    site = watch.site_of(write_run(tmp_path / "run", Motion(t_end=1.0)))
+    with serving(site):
+        assert send(site, b"") == send(site, b"GET / HTTP/1.1\r\nHost:") == b""
+
+
+_lines = st.text(st.characters(codec="latin-1"), max_size=30).map(lambda s: s.encode("latin-1"))
+_ways = st.sampled_from(
+    [b"/", b"/live", b"/scene?run=", b"/stop", b"/report", b"/%", b"/\x00", b"*"]
+)
+
+
+def test_no_request_is_a_fault(run_site: Site) -> None:
+    """Whatever comes is answered, or the connection is closed; never with 500."""
+
+    @given(st.sampled_from([b"GET", b"POST", b"PUT", b"\x00"]), _ways, _lines,
+           st.lists(st.tuples(_lines, _lines), max_size=3), st.binary(max_size=40))  # fmt: skip
+    @settings_of_hypothesis(max_examples=200, deadline=None, database=None)
+    def attack(
+        verb: bytes, way: bytes, more: bytes, heads: list[tuple[bytes, bytes]], body: bytes
+    ) -> None:
+        lines = b"".join(name + b": " + said + b"\r\n" for name, said in heads)
+        size = b"Content-Length: %d\r\n" % len(body)
+        content = verb + b" " + way + more + b" HTTP/1.1\r\nOURS" + size + lines
+        answer = send(run_site, content + b"Connection: close\r\n\r\n" + body, 10)
+        assert answer == b"" or answer[9:12] in (
+            b"200", b"400", b"403", b"404", b"405", b"411", b"413", b"421", b"422", b"501",
+        ), (content, answer)  # fmt: skip
+
+    attack()
 
 
 def test_a_run_that_was_killed_does_not_run(tmp_path: Path) -> None:
@@ -262,6 +345,21 @@ def test_a_run_that_was_killed_does_not_run(tmp_path: Path) -> None:
         found = living.state(Run(folder))
         assert (found.words, found.running) == ("running", True)
         assert living.ask_to_stop(folder) and (folder / "stop").exists()
+
+
+def test_another_program_is_not_stopped(tmp_path: Path) -> None:
+    """Whom a lock file names may be anybody: nothing is sent to a process that does not hold it."""
+    folder = write_run(tmp_path / "run", Motion(t_end=1.0))
+    with subprocess.Popen(["sleep", "60"]) as other, (folder / "run.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for pid in (other.pid, os.getpid(), 999_999_999):
+            lock.seek(0)
+            lock.write(f"pid {pid} on {os.uname().nodename}\n")
+            lock.flush()
+            with pytest.raises(BadRun, match="is another program|cannot be reached"):
+                living.stop_at_once(folder)
+        assert other.poll() is None
+        other.kill()
 
 
 def test_an_ensemble_is_told_to_stop_by_its_process(tmp_path: Path) -> None:
@@ -467,6 +565,56 @@ def test_a_case_of_somebody_else_is_not_overwritten(draft: Draft) -> None:
     assert "t_end = 2" in draft.case.read_text() and draft.state()["saved"]
 
 
+@needs_mics
+def test_one_run_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two windows ask at once; a studio that is opened anew finds the run."""
+    monkeypatch.chdir(tmp_path)
+    case = tmp_path / "case.nml"
+    case.write_text(CASE)
+    site, again = studio.site_of(case, MICS), studio.site_of(case, MICS)
+
+    def run(site: Site) -> int:
+        return request(site, "/run", method="POST", body={"number": 0}, **{TOKEN: site.token})[0]
+
+    with serving(site), ThreadPoolExecutor(2) as windows:
+        assert request(site, "/watch")[:1] == (303,)
+        assert request(site, "/watch")[1]["Location"] == "/"
+        assert sorted(windows.map(run, (site, site))) == [200, 422]
+        until(lambda: living.holder(tmp_path / "mics-here" / "run.lock"))
+    with serving(again):
+        assert request(again, "/watch")[0] == 200 and run(again) == 422
+        body = {"how": "now"}
+        assert request(again, "/stop", method="POST", body=body, **{TOKEN: again.token})[0] == 200
+        until(lambda: living.holder(tmp_path / "mics-here" / "run.lock") is None)
+
+
+@needs_mics
+def test_a_change_of_an_older_text_is_not_made(tmp_path: Path) -> None:
+    """Whoever sends it gets the newest one, and nothing is lost."""
+    case = tmp_path / "case.nml"
+    case.write_text(CASE)
+    site = studio.site_of(case, MICS)
+
+    def post(path: str, **body: Any) -> tuple[int, dict[str, Any]]:
+        status, _, text = request(site, path, method="POST", body=body, **{TOKEN: site.token})
+        return status, json.loads(text) if text.startswith("{") else {}
+
+    with serving(site):
+        status, state = post("/edit", op="copy", group="drop", n=0, number=0)
+        assert status == 200 and state["number"] == 1
+        late = {"group": "drop", "n": 0, "variable": "count", "value": "7"}
+        for number in (0, 2, None, "1"):
+            status, said = post("/edit", op="set", number=number, **late)
+            assert (status, said["state"]) == (409, state)
+            for path in ("/save", "/run"):
+                assert post(path, number=number)[0] == 409
+        assert case.read_text() == CASE
+        assert post("/edit", op="set", number=1, **late)[1]["number"] == 2
+        assert post("/edit", op="set", number=2, **late | {"n": "x"})[0] == 400
+        assert post("/edit", op="text", number=2, text="a\0b")[0] == 422
+        assert post("/save", number=2)[0] == 200 and "count = 7" in case.read_text()
+
+
 def test_what_is_typed_has_the_type_of_its_variable() -> None:
     text = {"type": "string"}
     assert typed(text, "10", "run.title") == "10" and typed(text, "'a, b'", "run.title") == "a, b"
@@ -552,6 +700,49 @@ def test_a_case_is_edited_run_stopped_and_reported(
         assert browser.run("document.querySelector('h1').textContent") == "Two cubes"
         assert (tmp_path / "mics-here" / "report.html").is_file()
         assert browser.errors == [] and outside(browser, address) == []
+
+
+@needs_mics
+@in_browser
+def test_two_windows_lose_nothing(tmp_path: Path, browser: Browser) -> None:
+    """What was typed just before Save is saved; over a change of another window one chooses."""
+    case = tmp_path / "case.nml"
+    case.write_text(CASE)
+    site = studio.site_of(case, MICS)
+
+    def saved(window: Browser, text: str) -> None:
+        window.run(f"{field('save')}.click()")
+        until(lambda: case.read_text() == text, 20)
+
+    with serving(site) as address, Browser(tmp_path / "other") as other:
+        for window, begin in ((browser, address), (other, site.address())):
+            window.visit(begin, 1200, 900)
+            until(lambda: window.run(VERDICT).startswith("Accepted"))  # noqa: B023
+        browser.run("document.querySelector('[data-show=text]').click()")
+        browser.run(f"{field('text')}.focus()")
+        browser.run(f"{field('text')}.setSelectionRange(0, 0)")
+        browser.key("!")
+        saved(browser, "!" + CASE)
+
+        type_into(other, "shape-0-size", "0.04")
+        until(lambda: other.run("document.getElementById('stale').open"))
+        other.run("document.querySelector('#stale [value=theirs]').click()")
+        until(lambda: "is shown" in other.run(f"{field('told')}.textContent"))
+        assert other.run(f"{field('text')}.value") == "!" + CASE
+        assert other.run(f"{field('shape-0-size')}.value") == "0.05"
+        type_into(other, "shape-0-size", "0.04")
+        saved(other, "!" + CASE.replace("size = 0.05", "size = 0.04"))
+
+        browser.key("!")
+        until(lambda: browser.run("document.getElementById('stale').open"))
+        browser.run("document.querySelector('#stale [value=mine]').click()")
+        until(lambda: not browser.run("document.getElementById('stale').open"))
+        saved(browser, "!!" + CASE)
+        browser.run("document.activeElement.blur()")
+        browser.run(f"{field('undo')}.click()")
+        browser.run(f"{field('undo')}.click()")
+        until(lambda: "size = 0.04" in browser.run(f"{field('text')}.value"))
+        assert [e for e in browser.errors + other.errors if "409" not in e] == []
 
 
 @needs_mics

@@ -11,7 +11,7 @@ async function ask(path, body) {
     headers: { 'Content-Type': 'application/json', 'X-Mics-Token': token } };
   const answer = await fetch(path, how);
   const said = answer.headers.get('Content-Type').includes('json') ? await answer.json() : { error: await answer.text() };
-  if (!answer.ok) throw new Error(said.error || answer.statusText);
+  if (!answer.ok) throw Object.assign(new Error(said.error || answer.statusText), { said });
   return said;
 }
 

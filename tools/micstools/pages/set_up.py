@@ -91,13 +91,18 @@ class Refused(BadRun):
 
 
 @contextmanager
-def read(program: Path, text: str) -> Iterator[SetUp]:
+def read(program: Path, text: str, patience: float | None = None) -> Iterator[SetUp]:
     """The set-up of a case of this text; files that it names are taken from where we are. It is
-    there within the `with` only. Raises `Refused`."""
+    there within the `with` only. Raises `Refused`, also where it takes more than `patience` [s]."""
     with tempfile.TemporaryDirectory(prefix="mics-plan-") as folder:
         file = Path(folder, "run.h5")
         words = [str(program), "--check", "--threads", "1", "--plan", str(file)]
-        done = subprocess.run(words, input=text, capture_output=True, text=True)
+        try:
+            done = subprocess.run(
+                words, input=text, capture_output=True, text=True, timeout=patience
+            )
+        except subprocess.TimeoutExpired as late:
+            raise Refused(f"the check takes more than {patience} s", text) from late
         if done.returncode:
             said = done.stderr.strip() or f"{program} ended with code {done.returncode}"
             raise Refused(said, text)

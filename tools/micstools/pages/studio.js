@@ -9,13 +9,17 @@ class Studio {
     this.player = player;
     this.form = document.getElementById('form');
     this.text = document.getElementById('text');
-    this.checking = this.again = false;
+    this.checking = this.again = this.wrong = false;
+    this.pending = new Set(); // fields whose change has not been sent yet
     this.form.addEventListener('input', event => this.later(event.target));
     this.form.addEventListener('change', event => this.later(event.target, 0));
     this.form.addEventListener('submit', event => event.preventDefault());
     this.text.addEventListener('input', () => this.later(this.text));
     document.addEventListener('click', event => this.click(event));
-    if (player) player.stage.grab = new Grab(player.stage, (body, by) => this.edit({ op: 'move', body, by }));
+    if (player) player.stage.grab = new Grab(player.stage, (body, by) => {
+      this.flush();
+      this.edit({ op: 'move', body, by });
+    });
     this.start();
   }
 
@@ -34,27 +38,46 @@ class Studio {
   }
 
   later(field, wait = TYPING) {
+    this.pending.add(field);
+    document.getElementById('save').disabled = false;
     clearTimeout(field.waiting);
     field.waiting = setTimeout(() => this.send(field), wait);
   }
 
+  // Sends at once what would be sent later.
+  flush() {
+    for (const field of this.pending) {
+      clearTimeout(field.waiting);
+      this.send(field);
+    }
+  }
+
   send(field) {
-    if (field === this.text) return this.edit({ op: 'text', text: field.value });
+    this.pending.delete(field);
+    if (field === this.text) return this.edit({ op: 'text', text: field.value }, field);
     const { group, n, variable } = field.dataset;
     if (!variable || field.sent === field.value) return null;
     field.sent = field.value;
-    return this.edit({ op: 'set', group, n: +n, variable, value: field.value });
+    return this.edit({ op: 'set', group, n: +n, variable, value: field.value }, field);
   }
 
-  // Changes are sent one after another.
-  edit(order) {
+  // Changes are sent one after another. One of a field counts for the groups that it was made for.
+  edit(order, field) {
+    const made = this.groups;
     this.line = (this.line || Promise.resolve()).then(async () => {
       try {
-        const state = await ask('edit', order), was = this.groups;
+        const was = this.groups;
+        if (order.op === 'set' && made !== was) throw new Error(`not changed: ${order.variable}, for the groups are others now`);
+        const state = await this.post('edit', order);
         this.take(state);
         if (order.op !== 'set' && order.op !== 'move' || was !== this.groups) await this.rebuild();
         tell('');
       } catch (problem) {
+        this.wrong = true;
+        if (field && field.isConnected && !problem.theirs) { // Save and Run try again
+          field.sent = undefined;
+          this.pending.add(field);
+        }
         tell(problem.message);
       }
       this.check();
@@ -62,17 +85,47 @@ class Studio {
     return this.line;
   }
 
-  // The text and the values of the case; a field that one is in stays as it is.
-  take({ text, values, saved, undo }) {
-    const here = document.activeElement;
+  // Asks for something that is based on the text of this page. Where another window has changed that,
+  // the text of either is taken.
+  async post(path, order) {
+    for (;;) try {
+      return await ask(path, { ...order, number: this.number });
+    } catch (problem) {
+      const { state } = problem.said || {};
+      if (!state) throw problem;
+      if (await this.choose() !== 'mine') {
+        document.activeElement.blur();
+        for (const field of this.pending) clearTimeout(field.waiting);
+        this.pending.clear();
+        this.take(state);
+        await this.rebuild();
+        throw Object.assign(new Error('the text of the other window is shown'), { theirs: true });
+      }
+      this.number = state.number;
+      this.number = (await this.post('edit', { op: 'text', text: this.shown })).number;
+    }
+  }
+
+  choose() {
+    const dialog = document.getElementById('stale');
+    dialog.returnValue = '';
+    dialog.onclick = event => { if (event.target.value) dialog.close(event.target.value); };
+    dialog.showModal();
+    return new Promise(done => { dialog.onclose = () => done(dialog.returnValue); });
+  }
+
+  // The text and the values of the case; a field that one is in, or has changed since, stays as it is.
+  take({ text, values, saved, undo, number }) {
+    const here = document.activeElement, free = field => field !== here && !this.pending.has(field);
+    Object.assign(this, { number, shown: text });
     this.groups = values.map(({ group, n }) => `${group}.${n}`).join();
-    if (this.text !== here) this.text.value = text;
+    if (free(this.text)) this.text.value = text;
     for (const { group, n, values: said } of values) for (const [name, value] of Object.entries(said || {})) {
       const field = document.getElementById(`${group}-${n}-${name}`);
-      if (field && field !== here && field.value !== value) field.value = field.sent = value;
+      if (field && free(field) && field.value !== value) field.value = field.sent = value;
     }
     document.getElementById('undo').disabled = !undo;
-    document.getElementById('save').disabled = saved;
+    document.getElementById('save').disabled = saved && !this.pending.size;
   }
 
   // Asks the program, one question at a time: of changes that come meanwhile the last one counts.
@@ -137,6 +190,8 @@ class Studio {
     if (!button) return;
     const { add, copy, remove, n, show } = button.dataset;
     if (copy || remove) event.preventDefault(); // stands in a summary, which would close
+    this.wrong = false;
+    this.flush();
     if (add) await this.edit({ op: 'add', group: add });
     if (copy) await this.edit({ op: 'copy', group: copy, n: +n });
     if (remove) await this.edit({ op: 'remove', group: remove, n: +n });
@@ -153,13 +208,11 @@ class Studio {
 
   // Saves or runs, once all changes have arrived.
   async order(path) {
-    for (const field of [this.text, ...this.form.querySelectorAll('[data-variable]')]) clearTimeout(field.waiting);
-    const here = document.activeElement;
-    if (here === this.text || here.dataset.variable) this.send(here);
     await this.line;
+    if (this.wrong) return;
     tell('…');
     try {
-      const { told, open } = await ask(path, {});
+      const { told, open } = await this.post(path, {});
       tell(told);
       if (open) location.assign(open);
       else this.take(await ask('draft'));

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from micstools import files
 from micstools.cases import case_copy, settings
 from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import Refused, Remark
@@ -45,6 +46,7 @@ NEW = """! A first case: cubes dropped into a small tank.
 _FIRST = {"shape": {"kind": "cube", "size": 0.02}}
 """Values to begin with that the schema does not ask for, since they depend on others."""
 _STEPS = 200  # that can be taken back
+_PATIENCE = 120.0  # with a check [s]
 _FINE = 3  # digits of the tank's length to which a block that is moved is placed
 _HEAD = re.compile(r"^&\w+ \w+ = .*?: ")
 Schema = dict[str, Any]
@@ -60,8 +62,12 @@ def schema_of(program: Path) -> Schema:
     return found
 
 
+class Stale(BadRun):
+    """A change is based on a text that is no longer the one of the draft."""
+
+
 class Draft:
-    """The text of a case beside its file. Changes are one at a time."""
+    """The text of a case beside its file. Changes are one at a time; each has a number."""
 
     def __init__(self, case: Path, program: Path) -> None:
         """Of a case file that may not be there yet."""
@@ -72,10 +78,11 @@ class Draft:
         self.lock = threading.RLock()
         self.saved = settings.read(case) if case.exists() else ""
         self.text = self.saved or NEW
+        self.number = 0  # of changes so far
         self.before: list[str] = []
+        self.seen = -1  # number of the text whose bodies are these
         self.bodies: list[tuple[str, int]] = []  # group and occurrence of each
         self.step = 0.0  # places of blocks are multiples of this [m]
-        self.accepted = False
 
     @property
     def groups(self) -> dict[str, Schema]:
@@ -126,8 +133,18 @@ class Draft:
         with self.lock:
             before = self.text
             work[op](order)
-            if op != "undo" and self.text != before:
+            if self.text == before:
+                return
+            if op != "undo":
                 self.before = [*self.before[-_STEPS:], before]
+            self.number += 1
+            if op == "move":  # and no group came or went
+                self.seen = self.number
+
+    def require(self, number: object) -> None:
+        """Raise Stale where the text has another number."""
+        if number != self.number:
+            raise Stale("the case was changed in another window since this page showed it")
 
     def _set(self, order: dict[str, Any]) -> None:
         group, name, n = str(order["group"]), str(order["variable"]), int(order["n"])
@@ -181,6 +198,8 @@ class Draft:
 
     def _move(self, order: dict[str, Any]) -> None:
         body, by = int(order["body"]), [float(v) for v in order["by"]]
+        if self.seen != self.number:
+            raise BadRun("the blocks shown are those of an older text: wait for the check")
         if not 0 <= body < len(self.bodies) or not all(math.isfinite(v) for v in by):
             raise BadRun("no such block")
         group, n = self.bodies[body]
@@ -194,7 +213,10 @@ class Draft:
         self.text = settings.set_group(self.text, group, {"position": new}, n)
 
     def _write(self, order: dict[str, Any]) -> None:
-        self.text = str(order["text"]).replace("\r\n", "\n")
+        text = str(order["text"]).replace("\r\n", "\n")
+        if "\0" in text:
+            raise BadRun("this is no text")
+        self.text = text
 
     def _undo(self, _: dict[str, Any]) -> None:
         if self.before:
@@ -203,17 +225,18 @@ class Draft:
     def look(self) -> dict[str, Any]:
         """What the program says of the text: the plan with its scene, or what is wrong."""
         with self.lock:
-            text = case_copy.from_here(self.text, self.case.parent)
+            number, text = self.number, case_copy.from_here(self.text, self.case.parent)
         try:
-            with set_up.read(self.program, text) as found:
-                self.accepted = True
-                self._keep_bodies(found)
+            with set_up.read(self.program, text, _PATIENCE) as found:
+                with self.lock:
+                    if number == self.number:
+                        self.seen = number
+                        self._keep_bodies(found)
                 said = [_remark(w) for w in found.warnings]
                 parts = {k: v or "" for k, v in plan_page.parts(found).items()}
                 return {"problems": [], "warnings": said, "parts": parts,
                         "scene": plan_page.scene(found)}  # fmt: skip
         except Refused as refused:
-            self.accepted = False
             return {"problems": [_remark(r) for r in refused.remarks], "warnings": []}
 
     def _keep_bodies(self, found: set_up.SetUp) -> None:
@@ -232,18 +255,17 @@ class Draft:
         with self.lock:
             values = [{"group": g, "n": n, "values": said} for g, n, said in self.values()]
             return {"text": self.text, "values": values, "saved": self.text == self.saved,
-                    "undo": bool(self.before)}  # fmt: skip
+                    "undo": bool(self.before), "number": self.number}  # fmt: skip
 
-    def save(self) -> None:
+    def save(self) -> dict[str, Any]:
         """Write the case, unless somebody else has changed it since."""
         with self.lock:
             if self.case.exists() and settings.read(self.case) not in (self.saved, self.text):
                 raise BadRun(f"{self.case} was changed by another program: copy your text, "
                              "then open it anew")  # fmt: skip
-            new = self.case.with_name(self.case.name + ".new")
-            new.write_text(self.text, encoding="utf-8")
-            new.replace(self.case)
+            files.write(self.case, self.text)
             self.saved = self.text
+        return {"told": f"{self.case} is written"}
 
 
 def typed(about: Schema, words: str, name: str) -> Any:

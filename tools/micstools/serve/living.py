@@ -4,6 +4,7 @@ import fcntl
 import os
 import re
 import signal
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from micstools.reading.reader import BadRun, Run
 
-_HOLDER = re.compile(r"(?:pid )?(\d+) on (\S+)")
+_HOLDER = re.compile(r"(?:pid )?(\d{1,9}) on (\S+)")
 _RUNNING = -1  # exit status in the file while a run goes on, or after it was killed
 _RECENT = 20  # rows at the end that give the pace
 _WORDS = {0: "finished", 2: "refused", 3: "ended with numerical trouble", 4: "ended with trouble "
@@ -34,9 +35,11 @@ class Holder:
 def holder(lock: Path) -> Holder | None:
     """Who holds a lock file; none where nobody does. A file that was left behind means nothing: the
     system lets a lock go when its program ends."""
+    if not lock.is_file():  # a pipe would keep us waiting
+        return None
     try:
-        with lock.open() as file:
-            found = _HOLDER.search(file.read())
+        with lock.open(errors="replace") as file:
+            found = _HOLDER.search(file.read(200))
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return Holder(int(found[1]), found[2]) if found else Holder(0, "")
@@ -102,7 +105,7 @@ def stop_at_once(folder: Path) -> str:
     who = _living(folder)
     if not who.here:
         raise BadRun(f"the run is on {who.host}: only a stop with a restart file reaches it")
-    os.kill(who.pid, signal.SIGKILL)
+    _signal(who, folder / "run.lock", signal.SIGKILL)
     return "stopped at once; what was written stays"
 
 
@@ -111,11 +114,37 @@ def stop_ensemble(folder: Path, running: list[Path]) -> str:
     machine, the results that are `running` are asked one by one."""
     who = holder(folder / "ensemble.lock")
     if who and who.here:
-        os.kill(who.pid, signal.SIGTERM)
+        _signal(who, folder / "ensemble.lock", signal.SIGTERM)
         return "asked to stop: every run writes its restart file; the same command goes on"
     for path in running:
         ask_to_stop(path)
     return f"{len(running)} runs asked to stop"
+
+
+def _signal(who: Holder, lock: Path, number: signal.Signals) -> None:
+    """Send a signal to the process that a lock file names, if it is one of ours: `mics` or Python,
+    with the file open. Anybody may have written the file."""
+    wanted = "mics" if lock.name == "run.lock" else "python"
+    process = Path("/proc", str(who.pid))
+    try:
+        handle = os.pidfd_open(who.pid)
+    except (OSError, AttributeError) as problem:  # it has ended; or this is no Linux
+        raise BadRun(f"{lock}: process {who.pid} cannot be reached") from problem
+    try:
+        known = (process / "exe").readlink().name.startswith(wanted)
+        if not known or not any(_same(end, lock) for end in (process / "fd").iterdir()):
+            raise BadRun(f"{lock}: process {who.pid} is another program: nothing is stopped")
+        signal.pidfd_send_signal(handle, number)
+    except OSError as problem:
+        raise BadRun(f"{lock}: process {who.pid} cannot be reached") from problem
+    finally:
+        os.close(handle)
+
+
+def _same(one: Path, other: Path) -> bool:
+    with suppress(OSError):
+        return one.samefile(other)
+    return False
 
 
 def _living(folder: Path) -> Holder:

@@ -54,6 +54,7 @@ _FOREIGN = {  # a page that somebody else may have written: its scripts run, and
 }
 _LARGEST = 8_000_000  # bytes of a request
 _SOON = 300.0  # that a key of the address lets somebody in [s]
+_PATIENCE = 30.0  # with a request that does not come to its end [s]
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -98,13 +99,18 @@ class Site:
         found.add_routes([web.route(method, path, work) for method, path, work in self.routes])
         return found
 
+    def runner(self) -> web.AppRunner:
+        """What serves it; a connection without a whole request is closed after a while."""
+        return web.AppRunner(self.app(), access_log=None, keepalive_timeout=_PATIENCE)
+
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse what does not come from our own page; tell trouble in a line."""
         try:
             answer = self._refusal(request) or await handler(request)
         except web.HTTPException as problem:
-            answer = web.Response(status=problem.status, text=problem.reason)
+            kept = {n: problem.headers[n] for n in ("Allow", "Location") if n in problem.headers}
+            answer = web.Response(status=problem.status, text=problem.reason, headers=kept)
         except (BadRun, OSError) as problem:
             answer = json_answer({"error": str(problem)}, 422)
         except Exception as fault:  # of ours: told, and the page goes on
@@ -154,7 +160,24 @@ class Site:
 
 
 def _same(given: str, wanted: str) -> bool:
-    return hmac.compare_digest(given.encode(), wanted.encode())
+    return hmac.compare_digest(given.encode(errors="replace"), wanted.encode())
+
+
+async def order_of(request: web.Request) -> dict[str, Any]:
+    """What a request asks for: an object of JSON, with numbers and texts that can be written."""
+    try:
+        async with asyncio.timeout(_PATIENCE):
+            body = await request.read()
+    except TimeoutError:
+        raise web.HTTPRequestTimeout(reason="the request does not come to its end") from None
+    try:
+        found = json.loads(body)
+        json.dumps(found, ensure_ascii=False, allow_nan=False).encode()
+    except (ValueError, RecursionError):
+        raise web.HTTPBadRequest(reason="the request is no JSON") from None
+    if not isinstance(found, dict):
+        raise web.HTTPBadRequest(reason="the request is no object")
+    return found
 
 
 def json_answer(content: Any, status: int = 200) -> web.Response:
@@ -193,7 +216,7 @@ def serve(site: Site, port: int | None, browser: bool) -> None:
 
 
 async def _serve(site: Site, port: int, browser: bool) -> None:
-    runner = web.AppRunner(site.app(), access_log=None)
+    runner = site.runner()
     await runner.setup()
     try:
         listener = web.TCPSite(runner, ADDRESS, port)

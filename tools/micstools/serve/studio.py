@@ -3,6 +3,8 @@
 import os
 import subprocess
 import tempfile
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,8 @@ from micstools.pages.html import Markup, document, markup, tag
 from micstools.pages.parts import player
 from micstools.reading.reader import BadRun
 from micstools.serve import form, watch_page
-from micstools.serve.draft import Draft
-from micstools.serve.server import Site, apart, json_answer, page_answer
+from micstools.serve.draft import Draft, Stale
+from micstools.serve.server import Site, apart, json_answer, order_of, page_answer
 from micstools.serve.watch import Watch, Watched
 
 SCRIPTS = ("plan", "live", "studio")
@@ -65,8 +67,9 @@ class Studio:
 
     def __init__(self, draft: Draft) -> None:
         """Of a case that is being edited."""
-        self.draft, self.site, self.started = draft, Site(), None
-        self.watch = Watch(Watched(Path(OUTPUT)))
+        self.draft, self.site = draft, Site()
+        self.watched = Watched(self._folder())  # may go on since another studio was here
+        self.watch = Watch(self.watched)
         self.watch.add_to(self.site)
         self.site.get("/", self._page)
         self.site.get("/draft", self._state)
@@ -78,10 +81,12 @@ class Studio:
         self.site.post("/run", self._run)
         self.site.post("/go-on", self._go_on)
 
-    started: Started | None
-
     async def _page(self, _: web.Request) -> web.Response:
-        return page_answer(frame(self.draft, self.site.head()))
+        return page_answer(frame(self.draft, self.site.head(), await apart(self._known)))
+
+    def _known(self) -> bool:
+        """Is there a run to watch?"""
+        return self.watched.goes_on or (self.watched.folder / "run.h5").is_file()
 
     async def _state(self, _: web.Request) -> web.Response:
         return json_answer(await apart(self.draft.state))
@@ -93,69 +98,98 @@ class Studio:
         return json_answer(await apart(self.draft.look))
 
     async def _edit(self, request: web.Request) -> web.Response:
-        order = await request.json()
+        return await self._changed(request, self.draft.edit)
+
+    async def _save(self, request: web.Request) -> web.Response:
+        return await self._changed(request, lambda _: self.draft.save())
+
+    async def _run(self, request: web.Request) -> web.Response:
+        return await self._changed(request, lambda _: self._begin())
+
+    async def _changed(
+        self, request: web.Request, work: Callable[[dict[str, Any]], dict[str, Any] | None]
+    ) -> web.Response:
+        """Work on the text that the page shows; where it is no longer that, the newest one."""
+        order = await order_of(request)
+
+        def based() -> dict[str, Any]:
+            with self.draft.lock:
+                self.draft.require(order.get("number"))
+                return work(order) or self.draft.state()
+
         try:
-            await apart(self.draft.edit, order)
-        except (KeyError, TypeError, ValueError) as problem:
-            raise BadRun(f"this change cannot be made ({problem})") from problem
-        return json_answer(await apart(self.draft.state))
-
-    async def _save(self, _: web.Request) -> web.Response:
-        await apart(self.draft.save)
-        return json_answer({"told": f"{self.draft.case} is written"})
-
-    async def _run(self, _: web.Request) -> web.Response:
-        await apart(self._begin)
-        return json_answer({"told": "the run begins", "open": "/watch"})
+            return json_answer(await apart(based))
+        except Stale as problem:
+            state = await apart(self.draft.state)
+            return json_answer({"error": str(problem), "state": state}, 409)
+        except (KeyError, TypeError, ValueError, OverflowError) as problem:
+            raise web.HTTPBadRequest(reason="this change cannot be made") from problem
 
     async def _go_on(self, _: web.Request) -> web.Response:
         await apart(self._continue)
         return json_answer({"told": "the run goes on"})
 
-    def _begin(self) -> None:
-        self._require_rest()
-        self.draft.look()
-        if not self.draft.accepted:
-            raise BadRun("the program refuses this case: mend what is marked first")
-        self.draft.save()
-        folder = settings.value(self.draft.text, "run", "output") or OUTPUT
-        self._start(Started(self.draft, Path(str(folder).strip())))
+    def _begin(self) -> dict[str, Any]:
+        with self.draft.lock:  # one at a time
+            self._require_rest()
+            if self.draft.look()["problems"]:
+                raise BadRun("the program refuses this case: mend what is marked first")
+            self.draft.save()
+            self._start(Started(self.draft, self._folder()))
+        return {"told": "the run begins", "open": "/watch"}
 
     def _continue(self) -> None:
         """The run that was stopped, from its newest restart file."""
-        self._require_rest()
-        run = self.started.look() if self.started else None
-        if run is None or not run.restart_files:
-            raise BadRun("there is no restart file to go on from")
-        self._start(Started(self.draft, run.folder, run.folder / run.restart_files[-1]))
+        with self.draft.lock:
+            self._require_rest()
+            run = self.watched.look()
+            if run is None or not run.restart_files:
+                raise BadRun("there is no restart file to go on from")
+            self._start(Started(self.draft, run.folder, run.folder / run.restart_files[-1]))
+
+    def _folder(self) -> Path:
+        """The results of the case as it is saved."""
+        with suppress(BadRun):  # it cannot be read
+            return Path(str(settings.value(self.draft.saved, "run", "output") or OUTPUT).strip())
+        return Path(OUTPUT)
 
     def _require_rest(self) -> None:
-        if self.started and self.started.goes_on:
-            raise BadRun(f"a run goes on in {self.started.folder}: stop it first, or wait")
+        for watched in (self.watched, Watched(self._folder())):
+            if watched.goes_on:
+                raise BadRun(f"a run goes on in {watched.folder}: stop it first, or wait")
 
     def _start(self, started: Started) -> None:
-        self.started = self.watch.watched = started
+        self.watched = self.watch.watched = started
 
     async def _watch(self, _: web.Request) -> web.Response:
-        if not self.started:
+        if not await apart(self._known):
             raise web.HTTPSeeOther("/")
         back = tag("p", tag("a", "← back to the case", href="/"), class_="note")
-        title = await apart(self.started.title)
+        title = await apart(self.watched.title)
         go_on = tag("button", "Go on", type="button", id="go-on")
         return page_answer(watch_page.run_frame(title, self.site.head(), back, go_on))
 
 
-def frame(draft: Draft, head: Markup) -> str:
-    """The page of a case; form and check come later."""
+def frame(draft: Draft, head: Markup, known: bool) -> str:
+    """The page of a case; form and check come later. `known`: there is a run to watch."""
     label = "the set-up; arrow keys turn it, + and - zoom; in a flat view drag a block to move it"
     bar = tag(
         "div",
         tag("button", "Run", type="button", id="run", class_="play"),
         tag("button", "Save", type="button", id="save"),
         tag("button", "Undo", type="button", id="undo", disabled=True),
+        tag("a", "the run", href="/watch") if known else None,
         tag("output", id="told", role="status"),
         class_="row bare",
     )
+    stale = tag(
+        "dialog",
+        tag("h3", "The case was changed in another window"),
+        tag("p", "Show that text without your last change, or keep yours: Undo brings that back."),
+        tag("div", tag("button", "Show that text", type="button", value="theirs"),
+            tag("button", "Keep mine", type="button", value="mine"), class_="row"),
+        id="stale",
+    )  # fmt: skip
     ways = tag(
         "div",
         tag("button", "Form", type="button", data_show="form", aria_pressed="true"),
@@ -176,6 +210,7 @@ def frame(draft: Draft, head: Markup) -> str:
         tag("h1", draft.case.name),
         bar,
         tag("div", left, right, class_="studio"),
+        stale,
         script=_START,
         more=SCRIPTS,
         head=head,

@@ -1,12 +1,13 @@
 """Watches a run or an ensemble: reads its files at each look, changes nothing but by a button."""
 
+import re
 import threading
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
-from micstools import command
+from micstools import command, files
 from micstools.cases import settings
 from micstools.ensembles import ensemble
 from micstools.ensembles.ensemble import Member
@@ -14,7 +15,14 @@ from micstools.pages import ensemble_page, motion, run_page, run_words
 from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
-from micstools.serve.server import Site, apart, foreign_answer, json_answer, page_answer
+from micstools.serve.server import (
+    Site,
+    apart,
+    foreign_answer,
+    json_answer,
+    order_of,
+    page_answer,
+)
 
 MOST = 600  # rows of blocks that are read of a run
 
@@ -30,6 +38,11 @@ class Watched:
         self.began: object = None
         self.still: dict[str, Any] = {}  # of the scene
         self.columns: motion.Columns = {}
+
+    @property
+    def goes_on(self) -> bool:
+        """Does a program write to the folder?"""
+        return living.holder(self.folder / "run.lock") is not None
 
     def look(self) -> Run | None:
         """The run as it is now; none before it has a row. A run that began anew is another one."""
@@ -178,12 +191,14 @@ class Watch:
 
     async def _scene(self, request: web.Request) -> web.Response:
         if isinstance(self.watched, Ensemble):
-            number = int(request.query.get("run", "0") or 0)
-            return json_answer(await apart(self.watched.scene, number))
+            number = request.query.get("run", "")
+            if not re.fullmatch("[0-9]{1,9}", number):
+                raise web.HTTPBadRequest(reason=f"there is no run '{number[:20]}'")
+            return json_answer(await apart(self.watched.scene, int(number)))
         return json_answer(await apart(self.watched.scene))
 
     async def _stop(self, request: web.Request) -> web.Response:
-        how = (await request.json()).get("how")
+        how = (await order_of(request)).get("how")
         if how not in ("restart", "now"):
             raise BadRun("a run is stopped 'restart' or 'now'")
         if isinstance(self.watched, Ensemble):
@@ -201,7 +216,7 @@ class Watch:
             text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
         else:
             text = run_page.page(command.open_run(folder))
-        self.report.write_text(text, encoding="utf-8")
+        files.write(self.report, text)
 
     async def _report(self, _: web.Request) -> web.Response:
         if not self.report.is_file():
