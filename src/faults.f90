@@ -8,7 +8,7 @@ module faults_m
   use simulation_m, only: simulation_t
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
-  use release_m, only: n_pending
+  use release_m, only: n_pending, is_exit
   use deep_overlaps_m, only: overlap_fault
   implicit none
   private
@@ -123,8 +123,8 @@ contains
     end do
   end subroutine look_at_blocks
 
-  !> Is a centre of mass outside? Not so in periodic directions, nor above an open top, from where a
-  !! block falls back, unless it rises by more than the height of the tank.
+  !> Is a centre of mass behind a wall? One behind an open side is out (`release_m`), but that above
+  !! an open top falls back, unless it rises by more than the height of the tank.
   pure function has_left(grid, gravity, x, v) result(left)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3), x(3)
@@ -137,9 +137,9 @@ contains
     do d = 1, 3
       do s = 1, 2
         if (grid%periodic(d)) cycle
+        if (is_exit(grid, gravity, s, d)) cycle
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
-        if (.not. is_wall(grid%side(s, d)) .and. d == maxloc(abs(gravity), 1) &
-            .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp) then
+        if (.not. is_wall(grid%side(s, d))) then   ! the top
           beyond = beyond - grid%length(d)
           if (merge(-v(d), v(d), s == 1) <= 0.0_wp) beyond = 0.0_wp
         end if

@@ -3,7 +3,8 @@
 !! Stage, what it does, what it keeps to round-off or to the tolerance of a solver:
 !!
 !!     1  release      blocks whose time has come enter where there is room; the surface rises by
-!!                     the volume that they displace                       [volume of the liquid]
+!!                     the volume that they displace; those past an open side go
+!!                                                                         [volume of the liquid]
 !!     2  time step    dt = min(C h/|u|, C h/|U|, waves, 2 dt_before), to the next release
 !!     3  half kick    u += dt/2 (g - grad p/rho), in the liquid, on the bodies of the start
 !!     4  bodies       m dv/dt = F_fluid + F_contact + m g, dL/dt = T, in substeps
@@ -42,7 +43,7 @@ module step_m
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
-  use release_m, only: release_due_blocks, let_go_lowered, next_release, nothing_to_come
+  use release_m, only: release_due_blocks, let_go_lowered, take_out, next_release, nothing_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
   use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
@@ -188,13 +189,15 @@ contains
     report%curvature_fallback = sim%coupling%tension%surface%fallback
   end subroutine describe
 
-  !> Blocks whose time has come, with the force and the pressure with which they begin to move.
+  !> Blocks that have passed an open side go; those whose time has come enter, with the force and
+  !! the pressure with which they begin to move.
   subroutine release(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
     logical :: released
 
     call follow_motions(sim%clock%t, sim%blocks)
+    call take_out(sim%grid, sim%case%fluid%gravity, sim%clock%t, sim%blocks)
     call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%pending, &
                             report%warnings, released)
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &

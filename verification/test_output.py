@@ -140,7 +140,7 @@ def test_names_units_and_shapes(wet: Path) -> None:
         assert all(d.shape == (rows,) for d in h5["series"].values())
         assert set(h5["bodies"]) == {
             *BODY_ROWS, "shape", "name", "mass", "fixed",
-            "release_time", "entry_time", "raised", "planned", "status",
+            "release_time", "entry_time", "exit_time", "raised", "planned", "status",
         }  # fmt: skip
         for axis, cells in zip("xyz", (24, 16, 32), strict=True):
             assert h5[f"grid/{axis}"].shape == (cells + 1,)

@@ -18,7 +18,7 @@ module rigid_body_m
   implicit none
   private
   public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share, body_text
-  public :: to_come, lowering, let_go, left_out
+  public :: to_come, lowering, let_go, left_out, out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point, find_speeds
@@ -28,9 +28,9 @@ module rigid_body_m
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
     !! its radius
 
-  !> Status of a block: not there yet (its time may have come), held and lowered, released, or left
-  !! out for good because its place was taken.
-  integer, parameter :: to_come = 0, lowering = 1, let_go = 2, left_out = 3
+  !> Status of a block: not there yet (its time may have come), held and lowered, released, left
+  !! out for good because its place was taken, or out of the tank through an open side.
+  integer, parameter :: to_come = 0, lowering = 1, let_go = 2, left_out = 3, out = 4
 
   !> Given rates: (3, n) velocity [m/s], and spin, space frame [rad/s].
   type :: given_t
@@ -54,6 +54,7 @@ module rigid_body_m
     logical, allocatable :: still(:)             !! (n) asleep, or held at rest for ever
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
     real(wp), allocatable :: entry_time(:)       !! (n) likewise of coming into the tank [s]
+    real(wp), allocatable :: exit_time(:)        !! (n) when it was found out, < 0: never [s]
     real(wp), allocatable :: raised(:)           !! (n) above its place when that was taken [m]
     real(wp), allocatable :: planned(:, :)       !! (2, n) x, y without the random shift [m]
     character(name_length), allocatable :: name(:)   !! (n) of the unit in a plan; '': none
@@ -224,6 +225,7 @@ contains
       source=.false.)
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
       blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
+    allocate (blocks%exit_time(n), source=-1.0_wp)
     allocate (blocks%name(n), blocks%handling(n))
     allocate (blocks%planned(2, n), source=0.0_wp)
     allocate (blocks%on_ground(n), source=.false.)

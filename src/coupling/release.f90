@@ -8,18 +8,24 @@
 !! A block that is lowered comes in the same way, but is held: it moves down at a constant speed
 !! until it is let go at its place, at a height over what lies below, or where it touches that.
 !! Where it touches something earlier, or its sling goes slack, it is let go too.
+!!
+!! A block that passes an open side is taken out.
 module release_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
-  use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, left_out
+  use grid_m, only: grid_t
+  use boundary_kinds_m, only: is_wall
+  use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, &
+    left_out, out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, has_place, exclude
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
   public :: release_due_blocks, let_go_lowered, next_release, n_pending, nothing_to_come
+  public :: take_out, is_exit
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
   real(wp), parameter :: slack_share = 0.05_wp
@@ -228,6 +234,53 @@ contains
       yes = abs(blocks%release_time(a) - blocks%release_time(b)) <= same_time
     end function same_moment
   end subroutine order_due
+
+  !> Take the free blocks out whose centre of mass has passed an open side: they keep the place and
+  !! the speed of then, displace nothing and touch nothing any more. The fluxes of the step bring
+  !! fluid into the space that opens.
+  subroutine take_out(grid, gravity, time, blocks)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: time         !! [s]
+    type(blocks_t), intent(inout) :: blocks
+    logical :: passed
+    integer :: b, d
+
+    do b = 1, blocks%n
+      if (.not. blocks%present(b) .or. blocks%fixed(b)) cycle
+      passed = .false.
+      do d = 1, 3
+        associate (x => blocks%x(d, b) - grid%origin(d))
+          passed = passed .or. (x < 0.0_wp .and. is_exit(grid, gravity, 1, d)) &
+                   .or. (x > grid%length(d) .and. is_exit(grid, gravity, 2, d))
+        end associate
+      end do
+      if (.not. passed) cycle
+      blocks%status(b) = out
+      blocks%exit_time(b) = time
+      blocks%present(b) = .false.
+      blocks%asleep(b) = .false.
+      blocks%fluid_force(:, b) = 0.0_wp
+      blocks%fluid_torque(:, b) = 0.0_wp
+      blocks%lagged_force(:, b) = 0.0_wp
+      if (is_root()) write (error_unit, '(a)') 'mics: t = '//brief(time, 6)//' s: ' &
+        //body_text(b, blocks)//' is out: it passed an open side at ('//to_text(blocks%x(:, b)) &
+        //') m with '//brief(norm2(blocks%v(:, b)))//' m/s'
+    end do
+  end subroutine take_out
+
+  !> Does a block that passes this side leave the tank? Not through a wall or a period, nor through
+  !! an open top, from where it falls back.
+  pure function is_exit(grid, gravity, s, d) result(yes)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    integer, intent(in) :: s, d          !! side 1 or 2 of a direction
+    logical :: yes
+
+    yes = .not. (grid%periodic(d) .or. is_wall(grid%side(s, d))) &
+      .and. .not. (d == maxloc(abs(gravity), 1) &
+                   .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp)
+  end function is_exit
 
   !> Time of the next release that is still to come; huge if there is none [s].
   pure function next_release(time, blocks) result(next)

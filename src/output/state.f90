@@ -98,6 +98,7 @@ contains
     call list%add('/blocks/still', blocks%still)
     call list%add('/blocks/release_time', 's', blocks%release_time)
     call list%add('/blocks/entry_time', 's', blocks%entry_time)
+    call list%add('/blocks/exit_time', 's', blocks%exit_time)
     call list%add('/blocks/raised', 'm', blocks%raised)
     call list%add('/blocks/position', 'm', blocks%x)
     call list%add('/blocks/quaternion', '1', blocks%q)

@@ -24,8 +24,8 @@ module write_run_m
     close_run_file
 
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
-    'raised']                                !! datasets with a number per block
-  character(*), parameter :: once_units(*) = ['s', 's', 'm']
+    'exit_time', 'raised']                   !! datasets with a number per block
+  character(*), parameter :: once_units(*) = ['s', 's', 's', 'm']
   integer, parameter :: running = -1         !! exit status until the run ends, or if it was killed
 
   type, extends(h5_table_t) :: run_file_t
@@ -199,7 +199,7 @@ contains
     call file%store('/bodies/planned', 'm', blocks%planned)
     call file%store('/bodies/status', '1', blocks%status)
     call file%attribute('/bodies/status', 'meaning', '0 not there yet, 1 being lowered, ' &
-      //'2 released, 3 left out')
+      //'2 released, 3 left out, 4 out of the tank')
   end subroutine write_bodies
 
   !> What may change once or twice in a run, of all blocks.
@@ -211,6 +211,7 @@ contains
     select case (c)
     case (1); values = blocks%release_time
     case (2); values = blocks%entry_time
+    case (3); values = blocks%exit_time
     case default; values = blocks%raised
     end select
   end function once_values

@@ -13,7 +13,9 @@ import numpy as np
 from run_cases import MPI_SETTINGS, Machine
 from same_bits import LOCK, contents, differences
 
-CHANGING = {f"bodies/{name}" for name in ("release_time", "entry_time", "raised", "status")}
+CHANGING = {
+    f"bodies/{name}" for name in ("release_time", "entry_time", "exit_time", "raised", "status")
+}
 """Datasets that are written again when a block comes in or is let go."""
 
 CASE = """! A fixed, a free and a dropped block; every result file grows often. One second.

@@ -49,7 +49,7 @@ def _tell_left_out(run: Run) -> None:
     """Which blocks the table of the end does not hold."""
     missing = [str(k + 1) for k in np.flatnonzero(~run.bodies.present(-1))]
     if missing:
-        print(f"left out, not released by the end: {', '.join(missing)}", file=sys.stderr)
+        print(f"left out, not in the tank at the end: {', '.join(missing)}", file=sys.stderr)
 
 
 EXPORT = Command(

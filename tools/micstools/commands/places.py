@@ -134,11 +134,13 @@ def some(numbers: list[str]) -> str:
 def tell_rest(found: list[Place]) -> None:
     """How many units lie still."""
     free = [p for p in found if not p.fixed]
-    out = [str(p.unit) for p in free if p.x != p.x]
+    out = [str(p.unit) for p in free if p.exit_time == p.exit_time]
+    waiting = [str(p.unit) for p in free if p.time != p.time]
     moving = [str(p.unit) for p in free if p.x == p.x and not p.at_rest]
     print(f"{len(free)} free units, {sum(p.at_rest for p in free)} of them at rest"
           + (f"; moving: {some(moving)}" if moving else "")
-          + (f"; not released: {some(out)}" if out else ""))  # fmt: skip
+          + (f"; out of the tank: {some(out)}" if out else "")
+          + (f"; not released: {some(waiting)}" if waiting else ""))  # fmt: skip
 
 
 def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:

@@ -50,7 +50,7 @@ def medians(table: Mapping[Member, State]) -> list[int]:
     tops: dict[object, list[tuple[float, int]]] = {}
     for member, end in table.items():
         run = Run(member.result) if end.counts else None
-        if run is not None and run.bodies.n and run.bodies.present(-1).all():
+        if run is not None and run.bodies.n and run.bodies.released(-1).all():
             tops.setdefault(member.choice, []).append((top_of_pile(run), member.number))
     if not tops:
         raise BadRun(f"{OPTION} {MEDIAN}: no run ended with a complete pile, there is no median")

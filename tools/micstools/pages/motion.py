@@ -67,6 +67,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
                 "wall": k in walls,
                 "colour": colours[k + 1],
                 "release": _known(b.entry_time[k]),
+                "exit": _known(b.exit_time[k]),
             }
             for k in range(b.n)
         ],

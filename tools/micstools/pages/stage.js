@@ -201,8 +201,8 @@ class Stage {
   }
 
   shown(k) {
-    const release = this.scene.bodies[k].release;
-    return release !== null && release <= this.time + 1e-9;
+    const { release, exit } = this.scene.bodies[k];
+    return release !== null && release <= this.time + 1e-9 && (exit == null || this.time < exit);
   }
 
   set(time) {

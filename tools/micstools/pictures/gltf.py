@@ -111,7 +111,7 @@ def _animation(buffer: _Buffer, run: Run, rows: IntArray, times: Array) -> dict[
         samplers.append({"input": clock, "output": output, "interpolation": way})
 
     for k in range(b.n):
-        there = b.entry_time[k] <= b.time[rows] + 1e-12
+        there = (b.entry_time[k] <= b.time[rows] + 1e-12) & (b.time[rows] < b.exit_time[k])
         if not there.all():
             size = np.where(there, 1.0, _GONE)
             add(k, "scale", np.repeat(size[:, None], 3, axis=1), "VEC3", "STEP")

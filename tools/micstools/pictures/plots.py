@@ -64,7 +64,7 @@ def _each_block(axis: Axes, run: Run, values: Array, title: str) -> None:
     """
     time = run.bodies.time
     for order, k in enumerate(run.bodies.dropped):
-        here = time >= run.bodies.entry_time[k] - 1e-12
+        here = (time >= run.bodies.entry_time[k] - 1e-12) & (time <= run.bodies.exit_time[k])
         axis.plot(
             time[here],
             values[here, k],

@@ -175,18 +175,21 @@ def at_rest(run: Run) -> Finding:
     """The blocks come to rest."""
     b, length = run.bodies, units.of_run(run).length
     found = rest.of_blocks(run)
-    out = int((~b.present(-1)).sum())
+    waiting, out = int((~b.released(-1)).sum()), int((b.status == 4).sum())
     worst = max(found, key=lambda one: one.moved / one.limit, default=None)
     figures = "no free block"
     statement = "all blocks at rest in the end"
     if worst:
         figures = f"block {worst.block} moved most, by {length.text(worst.moved)}"
         last = max(one.time for one in found)
-        figures += f"; all at rest from t = {figure(last)} s on" if last == last and not out else ""
+        if last == last and not waiting:
+            figures += f"; all at rest from t = {figure(last)} s on"
         statement += f" (moved less than {length.text(worst.limit)} in {figure(worst.span)} s)"
+    if waiting:
+        figures += f", {waiting} blocks not released yet"
     if out:
-        figures += f", {out} blocks not released yet"
-    return Finding(statement, not out and all(one.time == one.time for one in found), figures)
+        figures += f", {out} out of the tank"
+    return Finding(statement, not waiting and all(one.time == one.time for one in found), figures)
 
 
 def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
@@ -209,7 +212,7 @@ def pattern(run: Run) -> Finding:
     kind, low = classify(run)
     statement = "all dropped blocks lie on the fixed ones (pattern A)"
     b = run.bodies
-    released = int(b.present(-1)[b.dropped].sum())
+    released = int(b.released(-1)[b.dropped].sum())
     figures = f"pattern {kind}; dropped blocks on the floor: {_named(low)}"
     return Finding(statement, kind == "A", f"{figures}; {released} of {b.dropped.size} released")
 

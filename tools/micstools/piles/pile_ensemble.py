@@ -62,8 +62,8 @@ class Pile:
 
     @property
     def complete(self) -> bool:
-        """Are all blocks in it?"""
-        return bool(self.run.bodies.present(-1).all())
+        """Are all blocks released? One may have left the tank through an open side."""
+        return bool(self.run.bodies.released(-1).all())
 
 
 @dataclass(frozen=True)

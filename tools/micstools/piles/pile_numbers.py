@@ -139,7 +139,7 @@ def _randomness(run: Run, row: int) -> float:
 def time_to_rest(run: Run) -> float:
     """Time [s] after which every free block stays; nan where one moves or is still to come."""
     b = run.bodies
-    if not b.present(-1).all():
+    if not b.released(-1).all():
         return float("nan")
     return max((found.time for found in rest.of_blocks(run)), key=_nan_last, default=0.0)
 

@@ -63,6 +63,7 @@ class Place:
     plan_y: float
     plan_z: float
     touching: str
+    exit_time: float
 
 
 MEANING = {
@@ -75,7 +76,7 @@ MEANING = {
     "unturned unit heads along +x, east: 90",
     "tilt_deg": "angle of its z axis from the vertical",
     "deviation": "distance of x, y from plan_x, plan_y [m]",
-    "at_rest": "1: it stays where it is; 0: it moves, or was not released",
+    "at_rest": "1: it stays where it is; 0: it moves, is out of the tank, or was not released",
     "neighbours": "units that it touches",
     "contacts": "all that it touches: units, walls, floor or bed",
     "shape": "name of its shape",
@@ -85,6 +86,7 @@ MEANING = {
     "plan_y": "northing [m]",
     "plan_z": "level at its release [m]",
     "touching": "numbers of the units that it touches",
+    "exit_time": "when it passed an open side and was taken out of the tank [s]",
 }
 """The columns of a table of places."""
 
@@ -106,7 +108,7 @@ def planned(run: Run) -> Array:
     older programs; nan of one not released."""
     b = run.bodies
     rows = np.searchsorted(b.time, b.release_time + 1e-12, side="right") - 1
-    released = b.present(-1)
+    released = b.released(-1)
     start = b.position[rows.clip(0), np.arange(b.n)]
     found = b.position[(rows + 1).clip(0, len(b.time) - 1), np.arange(b.n), 2]
     waits = start[:, 2] > run.grid.high[2]  # over the tank, until its level is found
@@ -141,11 +143,12 @@ def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (i
                 contacts=len(beside) + len(seen.walls_of(k)) + (k in seen.bed),
                 shape=b.shape[k],
                 fixed=int(b.fixed[k]),
-                time=float(b.release_time[k]) if here else math.nan,
+                time=float(b.release_time[k]) if np.isfinite(plan[k, 0]) else math.nan,
                 plan_x=float(shown[k, 0]),
                 plan_y=float(shown[k, 1]),
                 plan_z=float(shown[k, 2]),
                 touching=" ".join(str(j + 1) for j in beside),
+                exit_time=float(b.exit_time[k]) if np.isfinite(b.exit_time[k]) else math.nan,
             )
         )
     return found
@@ -188,10 +191,10 @@ class Within:
 
 
 def within(found: Sequence[Place], tolerance: float) -> Within:
-    """Of all free units that were released."""
-    away = [p.deviation for p in found if not p.fixed and p.deviation == p.deviation]
-    count = sum(d <= tolerance for d in away)
-    return Within(tolerance, len(away), count, wilson(count, len(away)))
+    """Of all free units that were released; one out of the tank is not at its place."""
+    units = [p for p in found if not p.fixed and p.deviation == p.deviation]
+    count = sum(p.deviation <= tolerance and p.exit_time != p.exit_time for p in units)
+    return Within(tolerance, len(units), count, wilson(count, len(units)))
 
 
 def share_words(found: Within, length: Unit) -> str:
@@ -244,16 +247,20 @@ def ellipse_line(
 
 
 def landings(runs: Sequence[Sequence[Place]], tolerance: float) -> list[Landing]:
-    """Of each free unit that was released in one run at least."""
+    """Of each free unit that landed in one run at least. What lies within the tolerance counts also
+    the runs in which the unit left the tank."""
     each: dict[int, list[Place]] = {}
     for one in runs:
         for p in one:
-            if not p.fixed and p.x == p.x:
+            if not p.fixed and (p.x == p.x or p.exit_time == p.exit_time):
                 each.setdefault(p.unit, []).append(p)
     found = []
-    for _, known in sorted(each.items()):
+    for _, released in sorted(each.items()):
+        known = [p for p in released if p.x == p.x]
+        if not known:
+            continue
         middle, long, short, heading = ellipse(np.array([(p.x, p.y) for p in known]))
         x, y, who = float(middle[0]), float(middle[1]), known[0]
         found.append(Landing(who.unit, who.name, len(known), x, y, long, short, heading,
-                             within(known, tolerance)))  # fmt: skip
+                             within(released, tolerance)))  # fmt: skip
     return found

@@ -27,7 +27,8 @@ class Area:
 
 @dataclass(frozen=True)
 class Placing:
-    """Where the released free blocks of some runs lie at the end, seen from above."""
+    """Where the released free blocks of some runs lie at the end, seen from above; one out of
+    the tank lies where it passed the side."""
 
     blocks: int
     centre: tuple[float, float]  # mean of the centroids [m]
@@ -46,7 +47,7 @@ def ends(run: Run) -> Array:
 
 def _released(run: Run) -> Array:
     b = run.bodies
-    return np.array([int(k) for k in b.dropped if b.present(-1)[k]], dtype=int)
+    return np.array([int(k) for k in b.dropped if b.released(-1)[k]], dtype=int)
 
 
 def drop_area(runs: Sequence[Run]) -> Area:

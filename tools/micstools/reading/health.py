@@ -105,7 +105,7 @@ def _end(run: Run) -> Check:
 def _rest(run: Run, units: Units) -> list[Check]:
     """One check, where there are free blocks."""
     b = run.bodies
-    waiting = [int(k) + 1 for k in b.dropped if not b.present(-1)[k] and b.status[k] != 3]
+    waiting = [int(k) + 1 for k in b.dropped if not b.released(-1)[k] and b.status[k] != 3]
     found = rest.of_blocks(run)
     if not found and not waiting:
         return []

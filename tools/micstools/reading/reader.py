@@ -91,7 +91,8 @@ class Bodies:
     entry_time: Array  # (N) likewise of coming into the tank, earlier if a crane lowers it [s]
     raised: Array  # (N) height above the place, where that was taken [m]
     planned: Array  # (N, 2) x and y without the random shift, nan in results of older programs [m]
-    status: IntArray  # (N) 0 not there yet, 1 being lowered, 2 released, 3 left out
+    status: IntArray  # (N) 0 to come, 1 being lowered, 2 released, 3 left out, 4 out of the tank
+    exit_time: Array  # (N) when it was taken out behind an open side, infinite: never [s]
     time: Array  # (T) [s]
     position: Array  # (T, N, 3) [m]
     quaternion: Array  # (T, N, 4) w, x, y, z
@@ -119,13 +120,18 @@ class Bodies:
         """Row whose time is nearest to `t` [s]."""
         return int(np.abs(self.time - t).argmin())
 
-    def present(self, row: int) -> NDArray[np.bool_]:
-        """Which bodies are released at a row (N)."""
+    def released(self, row: int) -> NDArray[np.bool_]:
+        """Which bodies have been released until a row, also those out of the tank since (N)."""
         return np.asarray(self.release_time <= self.time[row] + 1e-12)
+
+    def present(self, row: int) -> NDArray[np.bool_]:
+        """Which bodies are released and in the tank at a row (N)."""
+        return np.asarray(self.released(row) & (self.exit_time > self.time[row]))
 
     def there(self, row: int) -> NDArray[np.bool_]:
         """Which bodies are in the tank at a row, released or held by a crane (N)."""
-        return np.asarray(self.entry_time <= self.time[row] + 1e-12)
+        now = self.time[row]
+        return np.asarray((self.entry_time <= now + 1e-12) & (self.exit_time > now))
 
 
 @dataclass(frozen=True)
@@ -486,7 +492,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     )
 
 
-_HANDLED = ("release_time", "entry_time", "raised", "status")
+_HANDLED = ("release_time", "entry_time", "exit_time", "raised", "status")
 """What became of each body."""
 
 
@@ -496,12 +502,16 @@ def _handled(group: h5py.Group, rows: dict[str, Array], placed: int) -> dict[str
     if "status" not in group:
         release = _true_release(due, rows, placed)
         status = np.where(np.isfinite(release), 2, 0)
-        return dict(zip(_HANDLED, (release, release, 0 * due, status), strict=True))
+        never = np.full(due.shape, np.inf)
+        return dict(zip(_HANDLED, (release, release, never, 0 * due, status), strict=True))
     status = group["status"][:].astype(int)
     to_come = (status == 0) & (due > rows["time"][-1] if len(rows["time"]) else True)
-    release = np.where((status == 2) | to_come, due, np.inf)
-    entry = np.where((status == 1) | (status == 2), group["entry_time"][:], release)
-    return dict(zip(_HANDLED, (release, entry, group["raised"][:], status), strict=True))
+    let_go = np.isin(status, (2, 4))
+    release = np.where(let_go | to_come, due, np.inf)
+    entry = np.where((status == 1) | let_go, group["entry_time"][:], release)
+    left = group["exit_time"][:] if "exit_time" in group else np.full(due.shape, np.inf)
+    left = np.where(status == 4, left, np.inf)
+    return dict(zip(_HANDLED, (release, entry, left, group["raised"][:], status), strict=True))
 
 
 def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
