@@ -71,7 +71,7 @@ def check(runs: list[Run], checks: Checks) -> None:
     for reference in rows("cases.csv"):
         case, peak = reference["case"], float(reference["umax_exp_m_s"])
         density = float(reference["rho_f"])
-        mine = [r for r in runs if float(r.value("fluid", "liquid_density", 0.0)) == density]
+        mine = [r for r in runs if float(r.value("fluid", "liquid_density")) == density]
         curves, peaks, heights = {}, {}, {}
         times, speeds = measured(f"{case}_velocity.csv")
         for run in sorted(mine, key=lambda r: -r.grid.spacing[0]):
