@@ -152,7 +152,7 @@ contains
       return
     end if
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
-    call find_case_warnings(case, shapes, bed, warnings)
+    call find_case_warnings(case, shapes, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
     message = ''

@@ -46,7 +46,7 @@ NAMED = {
 
 def rows(table: str) -> Iterator[tuple[str, list[str]]]:
     """Text and messages of each row."""
-    text, told = "", []
+    text, told = "", list[str]()
     for line in (Path(__file__).parent / "messages" / f"{table}.txt").read_text().splitlines():
         if line.startswith("##"):
             continue
@@ -69,7 +69,7 @@ def expanded(text: str) -> bytes:
 
 def mics(folder: Path, *words: str, text: bytes = b"") -> subprocess.CompletedProcess[bytes]:
     """Call the program in a folder with a case as its standard input."""
-    command = [ROOT / "mics", *words]
+    command = [str(ROOT / "mics"), *words]
     return subprocess.run(command, cwd=folder, input=text, capture_output=True, timeout=60)
 
 

@@ -1,9 +1,8 @@
-"""What `--check` foresees: falls, levels, volumes, and warnings set apart at the end."""
+"""What `--check` foresees: levels, volumes, and warnings set apart at the end."""
 
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from run_cases import ROOT
@@ -133,65 +132,6 @@ def test_a_box_of_water_has_a_volume(tmp_path: Path) -> None:
     box = "&water min = -1, 0, 0  max = 2, 4, 1 /"
     assert "boxes of liquid 1, 8 m3, bodies included\n" in plan_of(tmp_path, box, "")
     assert "boxes of liquid 2\n" in plan_of(tmp_path, 2 * box, "")
-
-
-def speed(plan: str, start: str) -> float:
-    """The speed that a plan tells [m/s]."""
-    found = re.search(re.escape(start) + r" (\S+) m/s", plan)
-    assert found, plan
-    return float(found[1])
-
-
-def test_falls_are_predicted(tmp_path: Path) -> None:
-    """Height, depth and cells; free fall in air; under water the estimate of the plan."""
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 6.5  velocity = 0, 0, -1 /")
-    assert (
-        "lowest point 6 m above the floor, 4 m above the water; water 2 m deep there, 20 cells"
-        in plan
-    )
-    enters = (1 + 2 * 9.81 * 4) ** 0.5
-    assert speed(plan, "meets the water at") == pytest.approx(enters, rel=0.01)
-    s, sphericity = 2300 / 998.2, (np.pi * 6**2) ** (1 / 3) / 6
-    drag = 0.42 * 10 ** (0.4 * (-np.log10(sphericity)) ** 0.2)
-    area = (3 * 1 + 6 * 2**0.5 + 4 * 3**0.5) / 13
-    terminal = (2 * (s - 1) * 9.81 / (drag * area)) ** 0.5
-    assert speed(plan, "a long fall in water ends at about") == pytest.approx(terminal, rel=0.03)
-    fade = np.exp(-2 * drag * area / (s + 0.5))
-    floor = (terminal**2 + (enters**2 - terminal**2) * fade) ** 0.5
-    assert speed(plan, "meets the floor at about") == pytest.approx(floor, rel=0.03)
-    assert "v_t^2 = 2 (s - 1) g V / (C A)" in plan and "Hoelzer and Sommerfeld" in plan
-
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 6.5 /", run="physics = 'dry'", fluid="")
-    assert "lowest point 6 m above the floor\n" in plan
-    assert speed(plan, "meets the floor at") == pytest.approx((2 * 9.81 * 6) ** 0.5, rel=0.01)
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 2  count = 3 /")
-    assert "the first of 3: lowest point 1.5 m above the floor, 0.5 m under water" in plan
-    assert "meets the water" not in plan
-    plan = plan_of(tmp_path, "&body shape = 'ball'  position = 2, 2, 3 /")
-    assert "&body on line 7 lowest point 2.5 m above the floor, 0.5 m above the water" in plan
-    assert "is lighter than the liquid and floats" in plan
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 3 /", "single_phase = .true.")
-    assert "under water; water 4 m deep there, 40 cells" in plan
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 5 /", "single_phase = .true.")
-    assert "0.5 m above the water; water 4 m deep there, 40 cells" in plan
-    (tmp_path / "bed.txt").write_text("2 2 0 0 4 4\n0 2 0 2\n")
-    plan = plan_of(tmp_path, f"&bed file = 'bed.txt' / {CUBE} 3, 2, 3 /")
-    assert (
-        "lowest point 1 m above the bed, 0.5 m above the water; water 0.5 m deep there, 5 cells"
-        in plan
-    )
-    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 3 /", sides="z_min = 'open'")
-    assert "lowest point at 2.5 m, 0.5 m above the water; water 2 m deep there, 20 cells" in plan
-    assert "if no block is in its way" not in plan
-    assert "Falls" not in plan_of(tmp_path, "&body shape = 'cube' position = 2,2,2 fixed = T /")
-
-
-def test_a_block_on_a_crane_does_not_fall(tmp_path: Path) -> None:
-    lowered = CUBE + "2, 2, 3  lowering_speed = 0.5  release = "
-    plan = plan_of(tmp_path, lowered + "'height'  release_height = 0.2 /")
-    assert "lowered at 0.5 m/s, let go 0.2 m over what lies below" in plan
-    assert "meets the" not in plan
-    assert "where it touches" in plan_of(tmp_path, lowered + "'touch' /")
 
 
 def test_a_drop_far_above_the_tank_is_asked_about(tmp_path: Path) -> None:

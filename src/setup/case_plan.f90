@@ -19,8 +19,6 @@ module case_plan_m
   use memory_plan_m, only: planned_memory, size_text
   use plan_text_m, only: heading, entry, left, right, triple, place_text, count_text
   use bed_measure_m, only: bed_volume
-  use fall_m, only: has_level
-  use fall_plan_m, only: print_falls
   use panel_method_m, only: added_inertia_t
   use light_m, only: added_inertia_of
   use surface_features_m, only: surface_init
@@ -60,7 +58,6 @@ contains
     if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
     if (blocks) call print_shapes(unit, case, shapes, n_points)
     if (blocks) call print_bodies(unit, case, shapes, bed)
-    if (blocks) call print_falls(unit, case, shapes, bed)
     call print_steps(unit, case, shapes, d_s, wet, blocks)
     call print_memory(unit, case, shapes)
     call print_files(unit, case, wet)
@@ -320,7 +317,9 @@ contains
     type(bed_t), intent(in) :: bed
     logical :: yes
 
-    yes = has_level(case) .and. .not. case%fluid%single_phase
+    yes = case%run%physics == 'light'
+    if (has_flow(case%run)) yes = len_trim(case%fluid%initial_state) == 0 &
+      .and. .not. case%fluid%single_phase .and. is_given(case%fluid%water_level)
     if (yes) yes = .not. any(gives_pressure(side_code(case%boundary%kind(:, 1:2))) &
       .or. case%boundary%kind(:, 1:2) == 'inflow') &
       .and. .not. gives_pressure(side_code(case%boundary%kind(1, 3)))

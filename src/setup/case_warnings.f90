@@ -6,9 +6,8 @@ module case_warnings_m
     smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
-  use tet_mesh_m, only: shape_t, extreme_of_family
-  use bed_m, only: bed_t
-  use fall_m, only: fall_t, find_fall
+  use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
+  use vectors_m, only: rotation_matrix
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
@@ -34,10 +33,9 @@ module case_warnings_m
 contains
 
   !> Collect everything odd about a checked case; nothing of it forbids a run.
-  subroutine find_case_warnings(case, shapes, bed, warnings)
+  subroutine find_case_warnings(case, shapes, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
-    type(bed_t), intent(in) :: bed
     type(problems_t), intent(inout) :: warnings
     integer :: s
 
@@ -53,7 +51,7 @@ contains
     call look_at_seeds(case, warnings)
     call look_at_rest(case, shapes, warnings)
     call look_at_times(case, warnings)
-    call look_at_heights(case, shapes, bed, warnings)
+    call look_at_heights(case, shapes, warnings)
     do s = 1, size(shapes)
       if (extreme_of_family(shapes, s)) call look_at_shape(case, case%shape(s), shapes(s), warnings)
     end do
@@ -182,10 +180,9 @@ contains
   end subroutine look_at_times
 
   !> Blocks that begin far above the tank.
-  subroutine look_at_heights(case, shapes, bed, warnings)
+  subroutine look_at_heights(case, shapes, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(bed_t), intent(in) :: bed
     type(problems_t), intent(inout) :: warnings
     integer :: i, n
 
@@ -203,16 +200,15 @@ contains
       type(place_t), intent(in) :: place
       character(*), intent(in) :: group
       integer, intent(in) :: line
-      type(fall_t) :: fall
-      real(wp) :: above
+      real(wp) :: above, turn(3, 3)
       integer :: s
 
       above = place%x(3) - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return   ! no need to look closer
       s = shape_of_place(place, shapes)
       if (s == 0) return
-      call find_fall(case, place, shapes(s), bed, fall)
-      above = fall%bottom - case%grid%origin(3) - case%grid%length(3)
+      turn = rotation_matrix(place%q)
+      above = above - extent_along(shapes(s), -turn(3, :))
       if (above <= far_above*case%grid%length(3)) return
       n = n + 1
       call warnings%add_message(group//' position = '//to_text(place%x)//': begins ' &

@@ -1,11 +1,11 @@
-!> How high the bed is at a place, and how much of the tank below a height is bed.
+!> How much of the tank below a height is bed.
 module bed_measure_m
   use kinds_m, only: wp
   use polygon_m, only: clip_polygon
-  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, max_clip_corners
+  use bed_m, only: bed_t, facet_within, max_clip_corners
   implicit none
   private
-  public :: bed_volume, bed_height
+  public :: bed_volume
 
 contains
 
@@ -54,24 +54,5 @@ contains
         *((p(3, 1) + p(3, v) + p(3, v + 1))/3.0_wp - floor)
     end do
   end function column
-
-  !> Height of the first ground below a point, of the bed or the floor of the tank [m].
-  pure function bed_height(bed, x, floor) result(height)
-    type(bed_t), intent(in) :: bed
-    real(wp), intent(in) :: x(3)    !! [m]
-    real(wp), intent(in) :: floor   !! of the tank [m]
-    real(wp) :: height
-    real(wp) :: at(3), here
-    integer :: f
-
-    height = floor
-    if (.not. bed%there) return
-    at = bed_place(bed, x)
-    do f = 1, size(bed%triangle, 2)
-      if (way_of(bed, f, at) <= 0) cycle
-      here = height_of(bed, f, at)
-      if (here <= x(3)) height = max(height, here)
-    end do
-  end function bed_height
 
 end module bed_measure_m

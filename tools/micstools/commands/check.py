@@ -2,15 +2,21 @@
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 
+<<<<<<< HEAD
 from micstools import files
+=======
+import h5py
+
+>>>>>>> 086cddb (Predict falls in Python)
 from micstools.cases import program
 from micstools.commands.base import Command
 from micstools.commands.report import NORTH_HELP, check_north
 from micstools.commands.run import call
-from micstools.pages import plan_page, set_up
-from micstools.reading.reader import BadRun
+from micstools.pages import falls, plan_page, set_up
+from micstools.reading.reader import BadRun, Run
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,12 +27,30 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--north", type=float, metavar="DEGREES", help=NORTH_HELP)
 
 
+def _print(given: argparse.Namespace) -> int:
+    """The plan as the program prints it, then the falls of the blocks."""
+    with tempfile.TemporaryDirectory(prefix="mics-plan-") as folder:
+        file = Path(folder, "run.h5")
+        code = call(given, ["--check", "--plan", str(file)])
+        if code or not file.exists():
+            return code
+        with h5py.File(file) as h5:
+            line = h5["plan/line"][:]
+        told = falls.falls(Run(folder), line)
+    if told:
+        print("Falls")
+    for name, words in told:
+        for k, text in enumerate(words):
+            print(f"  {'' if k else name:24}{text}")
+    return 0
+
+
 def _check(given: argparse.Namespace) -> int:
     if not given.page:
         for name in ("out", "north"):
             if getattr(given, name) is not None:
                 raise BadRun(f"--{name}: goes with --page")
-        return call(given, ["--check"])
+        return _print(given)
     check_north(given.north)
     text = program.case_text(given.case, given.settings)
     try:

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from micstools.cases import settings
+from micstools.pages import falls
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array, IntArray
 
@@ -120,7 +121,11 @@ def _found(run: Run, text: str, said: str) -> SetUp:
     warnings = [line for line in said.splitlines() if line.startswith(_WARNING)]
     remarks = [remark_of(line.removeprefix(_WARNING), text) for line in warnings]
     units = [str(name).strip("\0 ") for name in names]
-    return SetUp(run, text, parts_of(said), remarks, **plan, name=units)
+    parts = parts_of(said)
+    if told := falls.falls(run, plan["line"]):
+        steps = next(k for k, part in enumerate(parts) if part.heading == "Time steps")
+        parts.insert(steps, Part("Falls", [(name, "; ".join(words)) for name, words in told]))
+    return SetUp(run, text, parts, remarks, **plan, name=units)
 
 
 def spans(text: str) -> list[tuple[str, int, int]]:

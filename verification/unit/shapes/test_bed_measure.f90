@@ -1,11 +1,11 @@
-!> Volume of a bed below a level and its height under a point: slopes, closed forms, overhangs.
+!> Volume of a bed below a level: slopes, closed forms, overhangs.
 module test_bed_measure_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: case_t
   use bed_file_m, only: bed_form_t
   use bed_m, only: bed_t, set_bed
-  use bed_measure_m, only: bed_volume, bed_height
+  use bed_measure_m, only: bed_volume
   implicit none
   private
   public :: test_bed_measure
@@ -37,9 +37,7 @@ contains
   !> From the floor at x = 0 up to 1 m at x = 2 m, drawn wider than the tank.
   subroutine slope()
     type(bed_t) :: bed
-    type(bed_t) :: none
     real(wp), parameter :: low(3) = 0.0_wp
-    real(wp), parameter :: at(3) = [0.5_wp, 0.3_wp, 0.9_wp]
 
     call bed_of(reshape([-1.0_wp, -1.0_wp, -0.5_wp, 3.0_wp, -1.0_wp, 1.5_wp, 3.0_wp, 2.0_wp, &
       1.5_wp, -1.0_wp, 2.0_wp, -0.5_wp], [3, 4]), reshape([1, 2, 3, 1, 3, 4], [3, 2]), bed)
@@ -48,8 +46,6 @@ contains
       0.75_wp, 1.0e-14_wp)
     call check('below the floor', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.0_wp]), 0.0_wp, &
       1.0e-14_wp)
-    call check('height of the slope', bed_height(bed, at, 0.0_wp), 0.25_wp, 1.0e-14_wp)
-    call check('no bed, the floor', bed_height(none, at, -0.1_wp), -0.1_wp, 0.0_wp)
   end subroutine slope
 
   !> A box of 1 x 0.5 x 0.2 m that floats 0.3 m above the floor.
@@ -70,11 +66,6 @@ contains
       1.0e-14_wp)
     call check('half of it', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.4_wp]), 0.05_wp, 1.0e-14_wp)
     call check('none of it', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.2_wp]), 0.0_wp, 1.0e-14_wp)
-    call check('its top', bed_height(bed, [1.0_wp, 0.5_wp, 0.7_wp], 0.0_wp), 0.5_wp, 1.0e-14_wp)
-    call check('the floor under it', bed_height(bed, [1.0_wp, 0.5_wp, 0.2_wp], 0.0_wp), 0.0_wp, &
-      1.0e-14_wp)
-    call check('the floor beside it', bed_height(bed, [0.2_wp, 0.5_wp, 0.7_wp], 0.0_wp), 0.0_wp, &
-      1.0e-14_wp)
   end subroutine floating_box
 
 end module test_bed_measure_m
