@@ -5,12 +5,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-<<<<<<< HEAD
-from micstools import files
-=======
 import h5py
 
->>>>>>> 086cddb (Predict falls in Python)
+from micstools import files
 from micstools.cases import program
 from micstools.commands.base import Command
 from micstools.commands.report import NORTH_HELP, check_north
