@@ -29,6 +29,7 @@ module simulation_m
   use monolithic_m, only: monolithic_t, monolithic_init
   use mass_average_m, only: mass_average_t, mass_average_init
   use flow_start_m, only: start_flow
+  use stage_m, only: stage_t
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
   use timers_m, only: timer
@@ -62,7 +63,7 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     integer :: d, n_solids
 
     sim%case = case
@@ -115,8 +116,8 @@ contains
     call outflow_init(sim%grid, case%fluid, sim%flow%sides)
     call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)
     call copy_motion(sim%blocks, sim%coupling%bodies)
-    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%scratch, sim%coupling, &
-                    sim%start_converged)
+    call start_flow(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, case%run%dt), &
+                    sim%coupling, sim%start_converged)
     call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
 

@@ -33,6 +33,7 @@
 module step_m
   use kinds_m, only: wp
   use solid_geometry_m, only: solid_geometry_t, hand_over_faces
+  use stage_m, only: stage_t
   use solid_fraction_m, only: update_solid
   use liquid_fill_m, only: raise_surface
   use fluid_transport_m, only: begin_carrying, fit_fluxes, carry_fluid, finish_carrying, &
@@ -63,11 +64,12 @@ contains
 
   !> Advance by one step.
   subroutine take_step(sim, report)
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(out) :: report
     type(contact_report_t) :: contact
     type(coupling_report_t) :: coupling_report
     type(time_step_t) :: time_step
+    type(stage_t) :: stage
     real(wp) :: dt_before   !! of the last step [s]
 
     dt_before = sim%clock%dt
@@ -106,19 +108,21 @@ contains
         call tic(sim%timer_velocity)
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
         call start_of_stages(case%fluid%gravity, dt, blocks, coupling)
+        stage = stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, dt)
         ! 9 merging
-        call coupling%merge_cells(grid, sim%solid, dt, flow, scratch)
+        call coupling%average_momentum(stage)
+        call coupling%build_pressure_system(stage)
         ! 10 forces
-        call coupling%add_forces(grid, sim%solid, dt, flow, scratch)
+        call coupling%add_forces(stage)
         ! 11 viscosity
-        call coupling%add_viscosity(grid, sim%solid, dt, flow, scratch)
+        call coupling%add_viscosity(stage)
         ! 12 faces
-        call coupling%predict_faces(grid, sim%solid, dt, flow, scratch)
+        call coupling%predict_faces(stage)
         ! 13 projection
-        call coupling%project(grid, sim%solid, dt, flow, scratch, coupling_report)
+        call coupling%project(stage, coupling_report)
         ! 14 closing
         call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
-        call coupling%close(grid, sim%solid, flow, blocks, coupling_report)
+        call coupling%close(stage, blocks, coupling_report)
         call toc(sim%timer_velocity)
       end if
     end associate
@@ -203,12 +207,12 @@ contains
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
                         sim%next_let_go, report%warnings)
     if (.not. sim%wet) return
-    if (released) call reserve(sim)
+    if (released) call displace_liquid(sim)
     call first_force(sim)
   end subroutine release
 
   !> The liquid in the place of blocks that have come raises the free surface.
-  subroutine reserve(sim)
+  subroutine displace_liquid(sim)
     type(simulation_t), intent(inout) :: sim
     type(fluid_sums_t) :: fluid
 
@@ -217,12 +221,12 @@ contains
     call mix_fluid(sim%case%fluid, sim%flow)
     fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
     call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
-  end subroutine reserve
+  end subroutine displace_liquid
 
   !> A block that has just appeared gets the force of a fluid at rest when it is let go; after
   !! each step the fluid force of that step takes over.
   subroutine first_force(sim)
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     real(wp) :: force(6, size(sim%coupling%total, 2))
     logical :: begins(sim%blocks%n)
     integer :: b
@@ -230,7 +234,8 @@ contains
     begins = sim%blocks%present .and. .not. sim%initialised
     if (.not. any(begins)) return
     call copy_motion(sim%blocks, sim%coupling%bodies)
-    call sim%coupling%force_at_release(sim%grid, sim%solid, begins, sim%flow, sim%scratch, force)
+    call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
+      sim%clock%dt), begins, force)
     do b = 1, sim%blocks%n
       if (.not. begins(b)) cycle
       sim%blocks%fluid_force(:, b) = force(1:3, b)
@@ -241,16 +246,17 @@ contains
 
   !> What acts before the transport, and what the later stages need of the start of the step.
   subroutine begin(sim, dt_before, n_clipped)
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     real(wp), intent(in) :: dt_before   !! [s]
     integer, intent(out) :: n_clipped   !! bodies whose added mass in impacts a limit cuts
 
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call update_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
                          sim%blocks, n_clipped)
-    ! what the walls owe is an impulse
+    ! the impulse that is left of the last step, as a force over this one
     sim%blocks%lagged_force = dt_before/sim%clock%dt*sim%blocks%lagged_force
-    call sim%coupling%begin(sim%grid, sim%solid, sim%clock%dt, sim%flow, sim%blocks, sim%scratch)
+    call sim%coupling%begin(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, sim%clock%dt), &
+      sim%blocks)
   end subroutine begin
 
   !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which

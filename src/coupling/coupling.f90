@@ -7,11 +7,11 @@
 module coupling_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use scratch_m, only: scratch_t, take, give
-  use solid_geometry_m, only: solid_geometry_t
+  use scratch_m, only: take, give
+  use stage_m, only: stage_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: case_t, numerics_t, fluid_t
-  use fields_m, only: flow_t, add_product
+  use fields_m, only: add_product
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
@@ -49,7 +49,8 @@ module coupling_m
   contains
     procedure(of_release), deferred :: force_at_release
     procedure(of_start), deferred :: begin
-    procedure(of_stage), deferred :: merge_cells
+    procedure(of_stage), deferred :: average_momentum
+    procedure(of_stage), deferred :: build_pressure_system
     procedure(of_stage), deferred :: add_forces
     procedure(of_stage), deferred :: add_viscosity
     procedure(of_stage), deferred :: predict_faces
@@ -59,65 +60,47 @@ module coupling_m
 
   abstract interface
     !> Force and torque with which bodies that are let go begin to move (6, bodies) [N, N m].
-    subroutine of_release(self, grid, solid, begins, flow, scratch, force)
-      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+    subroutine of_release(self, s, begins, force)
+      import :: coupling_t, stage_t, wp
       implicit none
       class(coupling_t), intent(inout) :: self   !! its bodies in place
-      type(grid_t), intent(in) :: grid
-      type(solid_geometry_t), intent(in) :: solid
+      type(stage_t), intent(in) :: s             !! of its flow only the pressure changes
       logical, intent(in) :: begins(:)           !! (blocks) those let go; all others are held
-      type(flow_t), intent(inout) :: flow        !! only its pressure changes
-      type(scratch_t), intent(inout) :: scratch
       real(wp), intent(out) :: force(:, :)
     end subroutine of_release
 
     !> What the stages will need of the start of the step, and what acts before the transport.
-    subroutine of_start(self, grid, solid, dt, flow, blocks, scratch)
-      import :: coupling_t, grid_t, solid_geometry_t, flow_t, blocks_t, scratch_t, wp
+    subroutine of_start(self, s, blocks)
+      import :: coupling_t, stage_t, blocks_t
       implicit none
       class(coupling_t), intent(inout) :: self   !! its bodies as they move at the start
-      type(grid_t), intent(in) :: grid
-      type(solid_geometry_t), intent(in) :: solid
-      real(wp), intent(in) :: dt                 !! [s]
-      type(flow_t), intent(inout) :: flow
+      type(stage_t), intent(in) :: s
       type(blocks_t), intent(in) :: blocks
-      type(scratch_t), intent(inout) :: scratch
     end subroutine of_start
 
     !> A stage after the transport: fluid and bodies are where the step ends.
-    subroutine of_stage(self, grid, solid, dt, flow, scratch)
-      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+    subroutine of_stage(self, s)
+      import :: coupling_t, stage_t
       implicit none
       class(coupling_t), intent(inout) :: self
-      type(grid_t), intent(in) :: grid
-      type(solid_geometry_t), intent(in) :: solid
-      real(wp), intent(in) :: dt   !! [s]
-      type(flow_t), intent(inout) :: flow
-      type(scratch_t), intent(inout) :: scratch
+      type(stage_t), intent(in) :: s
     end subroutine of_stage
 
     !> Pressure; velocity of faces, cells and bodies; force and torque of the step on each body.
-    subroutine of_projection(self, grid, solid, dt, flow, scratch, report)
-      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp, &
-        coupling_report_t
+    subroutine of_projection(self, s, report)
+      import :: coupling_t, stage_t, coupling_report_t
       implicit none
       class(coupling_t), intent(inout) :: self
-      type(grid_t), intent(in) :: grid
-      type(solid_geometry_t), intent(in) :: solid
-      real(wp), intent(in) :: dt   !! [s]
-      type(flow_t), intent(inout) :: flow
-      type(scratch_t), intent(inout) :: scratch
+      type(stage_t), intent(in) :: s
       type(coupling_report_t), intent(inout) :: report
     end subroutine of_projection
 
     !> The faces as the next step carries fluid through them, with the final motion of the bodies.
-    subroutine of_end(self, grid, solid, flow, blocks, report)
-      import :: coupling_t, grid_t, solid_geometry_t, flow_t, blocks_t, coupling_report_t
+    subroutine of_end(self, s, blocks, report)
+      import :: coupling_t, stage_t, blocks_t, coupling_report_t
       implicit none
       class(coupling_t), intent(inout) :: self
-      type(grid_t), intent(in) :: grid
-      type(solid_geometry_t), intent(in) :: solid
-      type(flow_t), intent(inout) :: flow
+      type(stage_t), intent(in) :: s
       type(blocks_t), intent(inout) :: blocks
       type(coupling_report_t), intent(inout) :: report
     end subroutine of_end
@@ -143,7 +126,7 @@ contains
     case default; error stop 'coupling_init: no such momentum'
     end select
     if (self%implicit_momentum) call c_ismac_init(grid, n, case%numerics%advection, self%c_ismac)
-    call pressure_init(grid, n, case%numerics, self%pressure, pooled=.true.)
+    call pressure_init(grid, n, case%numerics, self%pressure)
     call acceleration_init(grid, self%acceleration)
     call surface_tension_init(grid, case%fluid, self%tension)
     allocate (self%from_pressure(6, n), source=0.0_wp)
@@ -183,81 +166,71 @@ contains
   end subroutine motion_after_fluid
 
   !> Force of the surface at the faces; `tension%force` is taken and has to be given back.
-  subroutine find_surface_force(fluid, grid, solid, c, scratch, self)
-    type(fluid_t), intent(in) :: fluid
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! C^, halo filled [-]
-    type(scratch_t), intent(inout) :: scratch
+  subroutine find_surface_force(s, self)
+    type(stage_t), intent(in) :: s
     class(coupling_t), intent(inout) :: self
 
     associate (tension => self%tension)
-      call take(scratch, tension%force)
-      call take(scratch, tension%surface%place)
-      call take(scratch, tension%surface%curvature)
-      call find_tension(grid, fluid, solid, c, tension)
-      call give(scratch, tension%surface%place)
-      call give(scratch, tension%surface%curvature)
+      call take(s%scratch, tension%force)
+      call take(s%scratch, tension%surface%place)
+      call take(s%scratch, tension%surface%curvature)
+      call find_tension(s%grid, self%fluid, s%solid, s%flow%c, tension)
+      call give(s%scratch, tension%surface%place)
+      call give(s%scratch, tension%surface%curvature)
     end associate
   end subroutine find_surface_force
 
   !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
   !! solids change; `self%tension` is that of the start.
-  subroutine keep_acceleration(grid, gravity, aperture, rho, flow, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+  subroutine keep_acceleration(s, aperture, rho, self)
+    type(stage_t), intent(in) :: s
+    real(wp), intent(in), contiguous :: &
+      aperture(s%grid%first(1):, s%grid%first(2):, s%grid%first(3):, :)
+    real(wp), intent(in), contiguous :: rho(s%grid%first(1):, s%grid%first(2):, s%grid%first(3):)
       !! that of the system [kg/m3]
-    type(flow_t), intent(in) :: flow
     class(coupling_t), intent(inout) :: self
 
-    associate (a => self%acceleration)
-      call face_acceleration(grid, gravity, flow%rho, rho, flow%p, a%face, flow%sides)
-      call add_tension(grid, rho, self%tension, a%face)
-      call cell_mean_of_faces(grid, aperture, a%face, self%c_ismac%a_old)
+    associate (flow => s%flow, a => self%acceleration)
+      call face_acceleration(s%grid, self%fluid%gravity, flow%rho, rho, flow%p, a%face, flow%sides)
+      call add_tension(s%grid, rho, self%tension, a%face)
+      call cell_mean_of_faces(s%grid, aperture, a%face, self%c_ismac%a_old)
     end associate
   end subroutine keep_acceleration
 
   !> Add gravity and old pressure to all cells, for 'mics' and C-ISMAC; with C-ISMAC those of the
   !! start of the step, which stand in `acceleration%cell` then.
-  subroutine accelerate_cells(grid, dt, flow, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(inout) :: flow
+  subroutine accelerate_cells(s, self)
+    type(stage_t), intent(in) :: s
     class(coupling_t), intent(inout) :: self
 
     if (self%implicit_momentum) then
-      call begin_predictor(grid, flow%u, self%c_ismac)
+      call begin_predictor(s%grid, s%flow%u, self%c_ismac)
       self%c_ismac%a_new = self%acceleration%cell
       self%acceleration%cell = self%c_ismac%a_old
     end if
-    call add_product(grid, dt, self%acceleration%cell, flow%u)
+    call add_product(s%grid, s%dt, self%acceleration%cell, s%flow%u)
   end subroutine accelerate_cells
 
   !> With C-ISMAC: exchange the acceleration in the cells for that of the density at hand, once the
   !! velocity of the faces is predicted.
-  subroutine renew_acceleration(dt, flow, self)
-    real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(inout) :: flow
+  subroutine renew_acceleration(s, self)
+    type(stage_t), intent(in) :: s
     class(coupling_t), intent(in) :: self
 
-    if (self%implicit_momentum) flow%u = flow%u + dt*(self%c_ismac%a_new - self%c_ismac%a_old)
+    if (self%implicit_momentum) s%flow%u = s%flow%u + s%dt*(self%c_ismac%a_new - self%c_ismac%a_old)
   end subroutine renew_acceleration
 
   !> Viscosity, and with C-ISMAC advection, into a velocity that has gravity and old pressure in.
-  subroutine predict_velocity(grid, rho, flow, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+  subroutine predict_velocity(s, rho, self)
+    type(stage_t), intent(in) :: s
+    real(wp), intent(in), contiguous :: rho(s%grid%first(1):, s%grid%first(2):, s%grid%first(3):)
       !! that of the system [kg/m3]
-    type(flow_t), intent(inout) :: flow
     class(coupling_t), intent(inout) :: self
 
     if (self%implicit_momentum) then
-      call solve_predictor(grid, rho, self%bodies, flow, self%viscous, self%c_ismac)
+      call solve_predictor(s%grid, rho, self%bodies, s%flow, self%viscous, self%c_ismac)
     else
-      call solve_viscous(grid, self%bodies, flow, self%viscous)
+      call solve_viscous(s%grid, self%bodies, s%flow, self%viscous)
     end if
   end subroutine predict_velocity
 

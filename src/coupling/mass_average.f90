@@ -12,7 +12,8 @@ module mass_average_m
   use vectors_m, only: cross
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo, unit_step
-  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
+  use scratch_m, only: take, give
+  use stage_m, only: stage_t
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -21,7 +22,7 @@ module mass_average_m
   use viscous_links_m, only: build_viscous
   use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: solve_pressure, divergence
+  use pressure_m, only: solve_pressure, both_solves, divergence
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
   use buoyancy_m, only: displaced_force
   use surface_stress_m, only: surface_stress
@@ -49,7 +50,8 @@ module mass_average_m
   contains
     procedure :: force_at_release
     procedure :: begin
-    procedure :: merge_cells
+    procedure :: average_momentum
+    procedure :: build_pressure_system
     procedure :: add_forces
     procedure :: add_viscosity
     procedure :: predict_faces
@@ -78,157 +80,133 @@ contains
   end subroutine mass_average_init
 
   !> Archimedes' force: the mixture makes the inertia of the fluid.
-  subroutine force_at_release(self, grid, solid, begins, flow, scratch, force)
+  subroutine force_at_release(self, s, begins, force)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
+    type(stage_t), intent(in) :: s
     logical, intent(in) :: begins(:)
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
     real(wp), intent(out) :: force(:, :)
 
-    associate (unused => begins, unused_too => scratch)
+    associate (unused => begins)
     end associate
-    call displaced_force(grid, self%fluid, solid, self%bodies, flow%c, force)
+    call displaced_force(s%grid, self%fluid, s%solid, self%bodies, s%flow%c, force)
   end subroutine force_at_release
 
   !> Stage 3: with C-ISMAC the acceleration of the cells.
-  subroutine begin(self, grid, solid, dt, flow, blocks, scratch)
+  subroutine begin(self, s, blocks)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(in) :: s
     type(blocks_t), intent(in) :: blocks
-    type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => dt, unused_too => blocks)
+    associate (unused => blocks)
     end associate
     if (.not. self%implicit_momentum) return
-    call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
-    call density_of_mixture(grid, solid, self%bodies, flow%rho, self%rho)
-    call keep_acceleration(grid, self%fluid%gravity, self%whole%aperture, self%rho, flow, self)
-    call give(scratch, self%tension%force)
+    call find_surface_force(s, self)
+    call density_of_mixture(s%grid, s%solid, self%bodies, s%flow%rho, self%rho)
+    call keep_acceleration(s, self%whole%aperture, self%rho, self)
+    call give(s%scratch, self%tension%force)
   end subroutine begin
 
   !> Stage 9: one velocity for fluid and bodies in a cell, the mean by mass. Buoyancy and the
   !! contact force act on the bodies before; gravity in the mixture is that of the fluid, so still
   !! water stays still.
-  subroutine merge_cells(self, grid, solid, dt, flow, scratch)
+  subroutine average_momentum(self, s)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
 
-    associate (unused => scratch)
-    end associate
-    associate (bodies => self%bodies, system => self%pressure%system)
-      call displaced_force(grid, self%fluid, solid, bodies, flow%c, self%from_level)
-      call push_bodies(dt, self%from_level, bodies)
+    associate (bodies => self%bodies)
+      call displaced_force(s%grid, self%fluid, s%solid, bodies, s%flow%c, self%from_level)
+      call push_bodies(s%dt, self%from_level, bodies)
       self%total = self%from_level
-      call density_of_mixture(grid, solid, bodies, flow%rho, self%rho)
-      call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, self%whole%aperture, self%rho, system, flow%sides)
-      call build_rigid_flux(grid, self%whole, bodies, system%active, system%operator%flux)
-      call average_cells(grid, solid, bodies, flow, self%rho)
+      call density_of_mixture(s%grid, s%solid, bodies, s%flow%rho, self%rho)
+      call average_cells(s%grid, s%solid, bodies, s%flow, self%rho)
     end associate
-    self%u_before = flow%u
-  end subroutine merge_cells
+    self%u_before = s%flow%u
+  end subroutine average_momentum
+
+  !> The same for the mixture, which has no walls.
+  subroutine build_pressure_system(self, s)
+    class(mass_average_t), intent(inout) :: self
+    type(stage_t), intent(in) :: s
+
+    associate (system => self%pressure%system)
+      call set_pressure_system(s%grid, self%whole%aperture, self%rho, system, s%flow%sides)
+      call build_rigid_flux(s%grid, self%whole, self%bodies, system%active, system%operator%flux)
+    end associate
+  end subroutine build_pressure_system
 
   !> Stage 10: old pressure, weight of the fluid, surface tension and surface stress.
-  subroutine add_forces(self, grid, solid, dt, flow, scratch)
+  subroutine add_forces(self, s)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
     real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
 
-    call take(scratch, by_stress)
-    associate (a => self%acceleration)
+    call take(s%scratch, by_stress)
+    associate (grid => s%grid, flow => s%flow, a => self%acceleration)
       call face_acceleration(grid, self%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
-      call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
+      call find_surface_force(s, self)
       call add_tension(grid, self%rho, self%tension, a%face)
-      call give(scratch, self%tension%force)
+      call give(s%scratch, self%tension%force)
       call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
+      if (self%implicit_momentum) call flux_of_faces(grid, s%dt, flow%uf, self%c_ismac%q)
+      call surface_stress(grid, s%solid%alpha, self%rho, flow%mu, flow%u, by_stress)
+      call accelerate_cells(s, self)
+      call add_product(grid, s%dt, by_stress, flow%u)
     end associate
-    if (self%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, self%c_ismac%q)
-    call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
-    call accelerate_cells(grid, dt, flow, self)
-    call add_product(grid, dt, by_stress, flow%u)
-    call give(scratch, by_stress)
+    call give(s%scratch, by_stress)
   end subroutine add_forces
 
   !> Stage 11: viscosity of the mixture; with C-ISMAC advection, too.
-  subroutine add_viscosity(self, grid, solid, dt, flow, scratch)
+  subroutine add_viscosity(self, s)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
 
-    associate (unused => solid)
-    end associate
-    call take_arrays(scratch, self%viscous)
-    call build_viscous(grid, self%whole, self%bodies, self%rho, flow%mu, dt, self%viscous)
-    call predict_velocity(grid, self%rho, flow, self)
+    call take_arrays(s%scratch, self%viscous)
+    call build_viscous(s%grid, self%whole, self%bodies, self%rho, s%flow%mu, s%dt, self%viscous)
+    call predict_velocity(s, self%rho, self)
     if (self%implicit_momentum) then   ! the force on a body has no part in advection
-      call advected_velocity(grid, self%rho, dt, self%viscous, self%c_ismac, self%u_before)
+      call advected_velocity(s%grid, self%rho, s%dt, self%viscous, self%c_ismac, self%u_before)
     end if
-    call give_arrays(scratch, self%viscous)
+    call give_arrays(s%scratch, self%viscous)
   end subroutine add_viscosity
 
   !> Stage 12: velocity of the faces before the pressure.
-  subroutine predict_faces(self, grid, solid, dt, flow, scratch)
+  subroutine predict_faces(self, s)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
 
-    associate (unused => solid, unused_too => scratch)
-    end associate
     call halo_exchange(self%acceleration%cell, n_halo)
-    call fill_velocity_halo(grid, flow%u)
-    call predict_face_velocity(grid, dt, self%rho, self%acceleration, flow)
-    call renew_acceleration(dt, flow, self)
+    call fill_velocity_halo(s%grid, s%flow%u)
+    call predict_face_velocity(s%grid, s%dt, self%rho, self%acceleration, s%flow)
+    call renew_acceleration(s, self)
   end subroutine predict_faces
 
   !> Stage 13: projection of the mixture and the force on the bodies; `coupling_passes` times, later
   !! passes from the mean by mass alone.
-  subroutine project(self, grid, solid, dt, flow, scratch, report)
+  subroutine project(self, s, report)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
     type(coupling_report_t), intent(inout) :: report
     integer :: pass
 
-    associate (bodies => self%bodies, last => self%pressure%report)
+    associate (grid => s%grid, flow => s%flow, a => self%acceleration)
       do pass = 1, self%passes
         if (pass > 1) then
-          call average_cells(grid, solid, bodies, flow, self%rho)
+          call average_cells(grid, s%solid, self%bodies, flow, self%rho)
           self%u_before = flow%u
-          call predict_again(grid, dt, flow, self)
+          a%cell = 0.0_wp
+          a%face = 0.0_wp
+          call fill_velocity_halo(grid, flow%u)
+          call predict_face_velocity(grid, s%dt, self%rho, a, flow)
         end if
-        call project_mixture(grid, dt, flow, self)
-        report%pressure%passes = report%pressure%passes + last%passes
-        report%pressure%iterations = report%pressure%iterations + last%iterations
-        report%pressure%converged = last%converged .and. (pass == 1 .or. report%pressure%converged)
-        call momentum_gained(grid, solid, dt, flow%u, self)
-        call push_bodies(dt, self%from_pressure, bodies)
+        call project_mixture(s, self)
+        if (pass > 1) self%pressure%report = both_solves(report%pressure, self%pressure%report)
+        report%pressure = self%pressure%report
+        call momentum_gained(grid, s%solid, s%dt, flow%u, self)
+        call push_bodies(s%dt, self%from_pressure, self%bodies)
         self%total = self%total + self%from_pressure
       end do
     end associate
-    call give_faces(scratch, self%pressure%system%operator%cf)
     report%viscous_converged = self%viscous%converged
   end subroutine project
 
@@ -291,38 +269,26 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine average_cells
 
-  !> Later passes start from the mass average alone.
-  subroutine predict_again(grid, dt, flow, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    class(mass_average_t), intent(inout) :: self
-
-    self%acceleration%cell = 0.0_wp
-    self%acceleration%face = 0.0_wp
-    call fill_velocity_halo(grid, flow%u)
-    call predict_face_velocity(grid, dt, self%rho, self%acceleration, flow)
-  end subroutine predict_again
-
   !> Projection of the mixture velocity, on the faces and in the cells.
-  subroutine project_mixture(grid, dt, flow, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    class(mass_average_t), intent(inout) :: self
+  subroutine project_mixture(s, self)
+    type(stage_t), intent(in) :: s
+    class(mass_average_t), intent(inout), target :: self
     real(wp), parameter :: weightless(3) = 0.0_wp
+    type(stage_t) :: of_mixture
     type(rigid_motion_t) :: none
 
+    of_mixture = s
+    of_mixture%solid => self%whole
     none%n = 0
     allocate (none%free(0))
-    associate (p => self%pressure, a => self%acceleration)
-      call solve_pressure(grid, self%whole, self%rho, dt, flow, none, p)
+    associate (grid => s%grid, flow => s%flow, p => self%pressure, a => self%acceleration)
+      call solve_pressure(of_mixture, self%rho, none, p)
       call face_acceleration(grid, weightless, flow%rho, self%rho, p%phi_total, a%face, &
                              flow%sides)
       call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
-      call add_product(grid, dt, a%cell, flow%u)
+      call add_product(grid, s%dt, a%cell, flow%u)
+      call fill_velocity_halo(grid, flow%u)
     end associate
-    call fill_velocity_halo(grid, flow%u)
   end subroutine project_mixture
 
   !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum
@@ -360,11 +326,9 @@ contains
 
   !> Stage 14: give cells and faces the final rigid velocity by mass average; what divergence that
   !! leaves is reported, since it is what the next step transports with.
-  subroutine overlay_bodies(self, grid, solid, flow, blocks, report)
+  subroutine overlay_bodies(self, s, blocks, report)
     class(mass_average_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(in) :: s
     type(blocks_t), intent(inout) :: blocks
     type(coupling_report_t), intent(inout) :: report
     integer :: b, d, m, i(3), low(3)
@@ -372,26 +336,26 @@ contains
 
     associate (unused => blocks)
     end associate
-    call average_cells(grid, solid, self%bodies, flow, self%rho)
-    do b = 1, self%bodies%n
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        d = solid%face(4, m)
-        i = solid%face(1:3, m)
-        low = i - unit_step(:, d)
-        if (any((i < 1 .or. low < 1 .or. i > grid%n) .and. .not. grid%periodic)) cycle
-        rigid = wall_velocity(self%bodies%motion(:, b), &
-                              nearest_arm(grid, solid%face_centroid(:, m), self%bodies%x(:, b)))
-        share = mass_share(solid%face_beta(m), body_density(self%bodies, b), &
-                           face_mean(flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
-        flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &
-            - flow%uf(i(1), i(2), i(3), d))
+    associate (grid => s%grid, solid => s%solid, flow => s%flow, system => self%pressure%system)
+      call average_cells(grid, solid, self%bodies, flow, self%rho)
+      do b = 1, self%bodies%n
+        do m = solid%body_face(b), solid%body_face(b + 1) - 1
+          d = solid%face(4, m)
+          i = solid%face(1:3, m)
+          low = i - unit_step(:, d)
+          if (any((i < 1 .or. low < 1 .or. i > grid%n) .and. .not. grid%periodic)) cycle
+          rigid = wall_velocity(self%bodies%motion(:, b), &
+                                nearest_arm(grid, solid%face_centroid(:, m), self%bodies%x(:, b)))
+          share = mass_share(solid%face_beta(m), body_density(self%bodies, b), face_mean( &
+            flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
+          flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &
+              - flow%uf(i(1), i(2), i(3), d))
+        end do
       end do
-    end do
-    do d = 1, 3
-      flow%solid_flux(:, :, :, d) = (1.0_wp - solid%aperture(:, :, :, d))*grid%area(d) &
-                                    *flow%uf(:, :, :, d)
-    end do
-    associate (system => self%pressure%system)
+      do d = 1, 3
+        flow%solid_flux(:, :, :, d) = (1.0_wp - solid%aperture(:, :, :, d))*grid%area(d) &
+                                      *flow%uf(:, :, :, d)
+      end do
       call divergence(grid, solid%aperture, flow, system%active, system%solver%rhs, &
                       report%pressure%divergence)
     end associate

@@ -9,7 +9,8 @@ module monolithic_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo
-  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
+  use scratch_m, only: take, give
+  use stage_m, only: stage_t
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
@@ -17,7 +18,7 @@ module monolithic_m
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: solve_pressure, pressure_report_t
+  use pressure_m, only: solve_pressure, both_solves
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
   use effective_aperture_m, only: hold_in_cells
@@ -43,6 +44,9 @@ module monolithic_m
   private
   public :: monolithic_t, monolithic_init
 
+  real(wp), parameter :: rough_factor = 1.0e3_wp
+    !! tolerance of the first of two pressure solves over that of the second
+
   type, extends(coupling_t) :: monolithic_t
     real(wp), allocatable :: unforced_motion(:, :)      !! (6, n) by weight and contact only
     type(rigid_motion_t) :: predicted               !! the motion at the end, by `extrapolated`
@@ -51,7 +55,7 @@ module monolithic_m
     type(merged_cells_t), allocatable :: merged_before, merged
       !! of the surface at the start and at the end of the step
     real(wp), allocatable :: given(:, :, :, :)
-      !! momentum of the first half kick, from `begin` to `add_forces` [kg m/s]
+      !! momentum of the first half kick [kg m/s]
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
@@ -60,11 +64,12 @@ module monolithic_m
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
     real(wp), allocatable :: correction(:, :, :, :)
-      !! of the faces at the start (`old_time_correction_m`), from `begin` to `predict_faces`
+      !! of the faces at the start of the step (`old_time_correction_m`) [m/s]
   contains
     procedure :: force_at_release
     procedure :: begin
-    procedure :: merge_cells
+    procedure :: average_momentum
+    procedure :: build_pressure_system
     procedure :: add_forces
     procedure :: add_viscosity
     procedure :: predict_faces
@@ -94,41 +99,39 @@ contains
     allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
               self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    if (self%implicit_momentum) return
+    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%correction, source=self%given)
   end subroutine monolithic_init
 
   !> Stage 3: the motion of the bodies as it goes on, the merged cells at the start; for C-ISMAC the
   !! acceleration of the cells, else how the faces at the surface differ from them, and the first
   !! half of the old pressure.
-  subroutine begin(self, grid, solid, dt, flow, blocks, scratch)
+  subroutine begin(self, s, blocks)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(in) :: s
     type(blocks_t), intent(in) :: blocks
-    type(scratch_t), intent(inout) :: scratch
 
-    call extrapolate_motion(self%fluid%gravity, dt, blocks, self)
+    call extrapolate_motion(self%fluid%gravity, s%dt, blocks, self)
     self%lagged(:, :blocks%n) = blocks%lagged_force
-    call find_merged_before(grid, solid, self)
-    call find_liquid(grid, flow, self%acceleration%given)
-    if (self%implicit_momentum) then
-      call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
-      call keep_acceleration(grid, self%fluid%gravity, solid%aperture, flow%rho, flow, self)
-      call give(scratch, self%tension%force)
-    else
-      call take(scratch, self%correction)
-      call take(scratch, self%given)
-      call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
-      associate (fluid => self%fluid, a => self%acceleration)
+    call find_merged_before(s%grid, s%solid, self)
+    associate (grid => s%grid, solid => s%solid, flow => s%flow, fluid => self%fluid, &
+               a => self%acceleration)
+      call find_liquid(grid, flow, a%given)
+      if (self%implicit_momentum) then
+        call find_surface_force(s, self)
+        call keep_acceleration(s, solid%aperture, flow%rho, self)
+        call give(s%scratch, self%tension%force)
+      else
+        call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
         call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, self%bodies, &
-                             dt, a, flow%p)
+                             s%dt, a, flow%p)
         call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
-        call find_first_half(grid, solid, self%merged_before, self%bodies, self%extrapolated/dt, &
-                             flow%rho, a)
-        call add_first_half(grid, fluid, dt, a, flow, self%given)
-      end associate
-    end if
+        call find_first_half(grid, solid, self%merged_before, self%bodies, &
+                             self%extrapolated/s%dt, flow%rho, a)
+        call add_first_half(grid, fluid, s%dt, a, flow, self%given)
+      end if
+    end associate
   end subroutine begin
 
   !> The merged cells of the start of the step: those of the end of the last one, or new ones if
@@ -168,246 +171,236 @@ contains
   end subroutine extrapolate_motion
 
   !> Stage 9: small cells at the new places and their targets, one momentum for each group; inertia
-  !! of the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
-  !! flux of the unit motions of the bodies.
-  subroutine merge_cells(self, grid, solid, dt, flow, scratch)
+  !! of the fluid in cut cells; how fast the fluid runs past the walls.
+  subroutine average_momentum(self, s)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
-
-    associate (unused => dt, unused_too => scratch)
-    end associate
-    self%unforced_motion = self%bodies%motion
-    call find_merged_cells(grid, solid, self%merged)
-    call copy_density(flow%rho, self%rho)
-    call begin_balance(grid, self%fluid, solid, self%merged, flow, self%rho, self%balance)
-    call match_densities(grid, self%rho, self%merged)
-    call find_slip(grid, solid, self%at_start, flow%u, self%merged)
-    call store_velocity(grid, self%merged, flow%u, self%balance%before)
-    call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
-                        flow%u, self%balance%to_wall)
-    call find_wall_speeds(grid, solid, self%at_start, flow%u, self%merged)
-    associate (system => self%pressure%system)
-      call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, solid%effective, self%rho, system, flow%sides)
-      call build_rigid_flux(grid, solid, self%bodies, system%active, system%operator%flux)
-    end associate
-  end subroutine merge_cells
-
-  !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
-  !! cell lies, bodies thought away, so that still water stays still; inertia has it, too, but in
-  !! the cells at walls, for which `begin_balance` finds it.
-  subroutine copy_density(level, rho)
-    real(wp), intent(in), contiguous :: level(:, :, :)   !! [kg/m3]
-    real(wp), intent(inout), contiguous :: rho(:, :, :)
+    type(stage_t), intent(in) :: s
     integer :: k
 
-    !$omp parallel do schedule(static)
-    do k = 1, size(rho, 3)
-      rho(:, :, k) = level(:, :, k)
-    end do
-  end subroutine copy_density
+    self%unforced_motion = self%bodies%motion
+    associate (grid => s%grid, solid => s%solid, flow => s%flow, merged => self%merged, &
+               balance => self%balance)
+      call find_merged_cells(grid, solid, merged)
+      ! Weight has the density of the level at which a cell lies, bodies thought away, so that still
+      ! water stays still; inertia has it, too, but in the cells at walls (`begin_balance`).
+      !$omp parallel do schedule(static)
+      do k = grid%first(3), grid%last(3)
+        self%rho(:, :, k) = flow%rho(:, :, k)
+      end do
+      call begin_balance(grid, self%fluid, solid, merged, flow, self%rho, balance)
+      call match_densities(grid, self%rho, merged)
+      call find_slip(grid, solid, self%at_start, flow%u, merged)
+      call store_velocity(grid, merged, flow%u, balance%before)
+      call share_momentum(grid, merged, balance%mass, self%at_start, balance%before, flow%u, &
+                          balance%to_wall)
+      call find_wall_speeds(grid, solid, self%at_start, flow%u, merged)
+    end associate
+  end subroutine average_momentum
+
+  !> The system of the pressure, and the flux of the unit motions of the bodies.
+  subroutine build_pressure_system(self, s)
+    class(monolithic_t), intent(inout) :: self
+    type(stage_t), intent(in) :: s
+
+    associate (system => self%pressure%system)
+      call set_pressure_system(s%grid, s%solid%effective, self%rho, system, s%flow%sides)
+      call build_rigid_flux(s%grid, s%solid, self%bodies, system%active, system%operator%flux)
+    end associate
+  end subroutine build_pressure_system
 
   !> Stage 10: weight, old pressure, surface tension and surface stress, on cells and bodies. Cells
   !! at the surface and in gas get the first three after the faces.
-  subroutine add_forces(self, grid, solid, dt, flow, scratch)
+  subroutine add_forces(self, s)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
     real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
 
-    call take(scratch, by_stress)
-    call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
-    associate (a => self%acceleration)
+    call take(s%scratch, by_stress)
+    call find_surface_force(s, self)
+    associate (grid => s%grid, flow => s%flow, a => self%acceleration)
       call face_acceleration(grid, self%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, self%rho, self%tension, a%face)
       self%counted = self%at_start%motion + self%extrapolated
-      call accelerations_of_groups(grid, solid, dt, self%extrapolated, self)
+      call accelerations_of_groups(s, self%extrapolated, self)
       if (self%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
-      call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
+      call surface_stress(grid, s%solid%alpha, self%rho, flow%mu, flow%u, by_stress)
       if (self%implicit_momentum) then
-        call accelerate_cells(grid, dt, flow, self)
+        call accelerate_cells(s, self)
       else
-        call add_second_half(grid, dt, a, flow%u)
+        call add_second_half(grid, s%dt, a, flow%u)
         self%from_half_kick = force_of_half_kick(grid, self%fluid, self%merged_before, &
-                                                 self%merged, self%bodies, dt, flow, a, self%given)
-        call give(scratch, self%given)
+          self%merged, self%bodies, s%dt, flow, a, self%given)
       end if
-      call add_product(grid, dt, by_stress, flow%u)
+      call add_product(grid, s%dt, by_stress, flow%u)
     end associate
-    call push_by_known_forces(grid, solid, dt, flow, self)
-    call give(scratch, self%tension%force)
-    call give(scratch, by_stress)
+    call push_by_known_forces(s, self)
+    call give(s%scratch, self%tension%force)
+    call give(s%scratch, by_stress)
   end subroutine add_forces
 
   !> Accelerations of the cells from those of the faces, and what groups make of them.
-  subroutine accelerations_of_groups(grid, solid, dt, change, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
+  subroutine accelerations_of_groups(s, change, self)
+    type(stage_t), intent(in) :: s
     real(wp), intent(in) :: change(:, :)   !! (6, bodies) of their motion that held fluid gets
     class(monolithic_t), intent(inout) :: self
 
-    associate (a => self%acceleration, balance => self%balance)
-      call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
-      call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
-      call add_push(grid, self%merged, dt, a%cell, balance)
+    associate (grid => s%grid, aperture => s%solid%aperture, a => self%acceleration)
+      call cell_mean_of_faces(grid, aperture, a%face, a%cell)
+      call hold_in_cells(grid, s%solid, self%bodies, change/s%dt, a%face, a%cell)
+      call add_push(grid, self%merged, s%dt, a%cell, self%balance)
       call halo_exchange(a%cell, n_halo)
-      call share_acceleration(grid, solid%aperture, self%rho, self%merged, a%cell)
-      call add_push(grid, self%merged, dt, a%cell, balance, taken=.true.)
+      call share_acceleration(grid, aperture, self%rho, self%merged, a%cell)
+      call add_push(grid, self%merged, s%dt, a%cell, self%balance, taken=.true.)
     end associate
   end subroutine accelerations_of_groups
 
   !> The same forces on the bodies.
-  subroutine push_by_known_forces(grid, solid, dt, flow, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(in) :: flow
+  subroutine push_by_known_forces(s, self)
+    type(stage_t), intent(in) :: s
     class(monolithic_t), intent(inout) :: self
 
-    associate (bodies => self%bodies, flux => self%pressure%system%operator%flux)
+    associate (grid => s%grid, flow => s%flow, bodies => self%bodies, &
+               flux => self%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
-      self%defect = mass_defect(grid, self%fluid, solid, bodies, flux, flow)
+      self%defect = mass_defect(grid, self%fluid, s%solid, bodies, flux, flow)
       self%held = held_mass(grid, bodies, flux, flow%rho)
-      call count_fluid(self%fluid%gravity, dt, self)
+      call count_fluid(self%fluid%gravity, s%dt, self)
       self%from_level = self%from_level + self%from_half_kick + self%lagged
-      call push_bodies(dt, self%from_pressure + self%from_level, bodies)
+      call push_bodies(s%dt, self%from_pressure + self%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
 
   !> Stage 11: viscosity, in cells and bodies at once; with C-ISMAC advection, too.
-  subroutine add_viscosity(self, grid, solid, dt, flow, scratch)
+  subroutine add_viscosity(self, s)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
 
-    call take_arrays(scratch, self%viscous)
-    associate (bodies => self%bodies, viscous => self%viscous, merged => self%merged, &
-               balance => self%balance)
-      call fill_velocity_halo(grid, flow%u)
-      call store_velocity(grid, merged, flow%u, balance%before)
+    call take_arrays(s%scratch, self%viscous)
+    associate (grid => s%grid, solid => s%solid, u => s%flow%u, bodies => self%bodies, &
+               viscous => self%viscous, merged => self%merged, balance => self%balance)
+      call fill_velocity_halo(grid, u)
+      call store_velocity(grid, merged, u, balance%before)
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, self%at_start, flow%u, merged)
-        call to_centres(grid, merged, self%at_start, flow%u)
+        call find_centres(grid, solid, self%at_start, u, merged)
+        call to_centres(grid, merged, self%at_start, u)
       end if
-      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged)
-      call predict_velocity(grid, self%rho, flow, self)
-      call to_centres(grid, merged, self%at_start, flow%u, back=.true.)
-      call fill_velocity_halo(grid, flow%u, layers=1)
-      call follow_targets(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
+      call build_viscous(grid, solid, bodies, self%rho, s%flow%mu, s%dt, viscous, merged)
+      call predict_velocity(s, self%rho, self)
+      call to_centres(grid, merged, self%at_start, u, back=.true.)
+      call fill_velocity_halo(grid, u, layers=1)
+      call follow_targets(grid, merged, balance%mass, balance%before, u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = self%unforced_motion
-      call push_bodies(dt, self%from_pressure + self%from_level + viscous%force, bodies)
-      call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
+      call push_bodies(s%dt, self%from_pressure + self%from_level + viscous%force, bodies)
+      call impose_rigid_velocity(grid, solid, merged, bodies, u)
     end associate
-    call give_arrays(scratch, self%viscous)
+    call give_arrays(s%scratch, self%viscous)
   end subroutine add_viscosity
 
   !> Stage 12: velocity of the faces before the pressure.
-  subroutine predict_faces(self, grid, solid, dt, flow, scratch)
+  subroutine predict_faces(self, s)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
 
     self%predicted%x = self%bodies%x
     self%predicted%motion = self%at_start%motion + self%extrapolated
-    call fill_velocity_halo(grid, flow%u, layers=1)
-    call halo_exchange(self%acceleration%cell, n_halo, layers=1)
-    associate (a => self%acceleration, merged => self%merged)
+    associate (grid => s%grid, dt => s%dt, flow => s%flow, a => self%acceleration, &
+               merged => self%merged)
+      call fill_velocity_halo(grid, flow%u, layers=1)
+      call halo_exchange(a%cell, n_halo, layers=1)
       call find_liquid(grid, flow, a%in_liquid, among=a%given)   ! the surface may have come
       if (self%implicit_momentum) then
         call predict_face_velocity(grid, dt, self%rho, a, flow)
       else
         call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction)
-        call give(scratch, self%correction)
         call shorten_at_walls(grid, dt, self%bodies, merged, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged, dt, &
+      call face_velocity_at_walls(grid, s%solid, self%at_start, self%predicted, merged, dt, &
                                   self%implicit_momentum, self%rho, a, flow)
       if (self%implicit_momentum) then
-        call renew_acceleration(dt, flow, self)
+        call renew_acceleration(s, self)
       else
         call add_whole(grid, dt, a, flow%u)
       end if
     end associate
   end subroutine predict_faces
 
-  !> Stage 13: pressure and motion of the bodies in one solve. What the fluid at the walls owes the
-  !! bodies (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure
-  !! follows in a second solve; the little that this one changes of it is left to the next step.
-  subroutine project(self, grid, solid, dt, flow, scratch, report)
+  !> Stage 13: pressure and motion of the bodies in one solve. What the walls bear
+  !! (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure follows in a
+  !! second solve; the little that this one changes of it is left to the next step.
+  subroutine project(self, s, report)
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(scratch_t), intent(inout) :: scratch
+    type(stage_t), intent(in) :: s
     type(coupling_report_t), intent(inout) :: report
-    real(wp) :: from_faces(6, self%bodies%n), from_walls(6, self%bodies%n)
-    integer :: solve, b
+    real(wp), dimension(6, self%bodies%n) :: of_walls, of_walls_again
+    integer :: b
 
     self%total = 0.0_wp
-    associate (bodies => self%bodies, merged => self%merged, balance => self%balance, &
-               pressure => self%pressure)
-      do solve = 1, 2
-        pressure%rough = solve == 1 .and. any(bodies%free)
-        call solve_pressure(grid, solid, self%rho, dt, flow, bodies, pressure)
-        report%pressure = added(report%pressure, pressure%report)
-        call correct_cells(grid, solid, dt, flow, self)
-        call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
-                              from_faces)
-        self%total = self%total + from_faces
-        call force_of_walls(grid, merged, bodies, self%at_start, dt, balance, from_walls)
-        call leave_counted(dt, self, from_walls)
-        if (solve == 1) then
-          self%lagged = from_walls
-          if (.not. any(bodies%free)) exit
-          call push_bodies(dt, self%lagged, bodies)
-        end if
-      end do
-      self%total = self%total + self%lagged
+    associate (bodies => self%bodies, pressure => self%pressure)
+      if (any(bodies%free)) then
+        call solve_once(s, rough_factor*pressure%tolerance, self, of_walls)
+        report%pressure = pressure%report
+        call push_bodies(s%dt, of_walls, bodies)
+        call solve_once(s, pressure%tolerance, self, of_walls_again)
+        report%pressure = both_solves(report%pressure, pressure%report)
+      else
+        call solve_once(s, pressure%tolerance, self, of_walls)
+        report%pressure = pressure%report
+      end if
+      self%total = self%total + of_walls
+      self%lagged = 0.0_wp
       do b = 1, bodies%n
-        self%lagged(:, b) = merge(from_walls(:, b) - self%lagged(:, b), 0.0_wp, bodies%free(b))
+        if (bodies%free(b)) self%lagged(:, b) = of_walls_again(:, b) - of_walls(:, b)
       end do
-      call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
-      call fill_velocity_halo(grid, flow%u)
-      call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, pressure)
-      call give_faces(scratch, pressure%system%operator%cf)
+      call impose_rigid_velocity(s%grid, s%solid, self%merged, bodies, s%flow%u)
+      call fill_velocity_halo(s%grid, s%flow%u)
+      call extend_pressure(s%grid, self%fluid%gravity, s%solid%alpha, s%flow, pressure)
     end associate
-    call sum_forces(dt, self)
+    call sum_forces(s%dt, self)
     report%viscous_converged = self%viscous%converged
   end subroutine project
 
-  !> Stage 14: the velocity of all the fluid in a face, held fluid included, and the flux of the
-  !! solids; what the walls owe the bodies is left to the next step.
-  subroutine close_faces(self, grid, solid, flow, blocks, report)
+  !> Pressure and motion of the bodies, the cells after them, and the force that the walls bear so
+  !! far; the force of the new pressure joins `total`.
+  subroutine solve_once(s, tolerance, self, of_walls)
+    type(stage_t), intent(in) :: s
+    real(wp), intent(in) :: tolerance   !! of the divergence [1/s]
     class(monolithic_t), intent(inout) :: self
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    type(flow_t), intent(inout) :: flow
+    real(wp), intent(out) :: of_walls(:, :)   !! (6, bodies) [N, N m]
+    real(wp), parameter :: weightless(3) = 0.0_wp
+    real(wp) :: from_faces(6, self%bodies%n)
+
+    associate (grid => s%grid, flow => s%flow, bodies => self%bodies, pressure => self%pressure, &
+               a => self%acceleration)
+      call solve_pressure(s, self%rho, bodies, pressure, tolerance)
+      call face_acceleration(grid, weightless, self%rho, self%rho, pressure%phi_total, a%face, &
+                             flow%sides)
+      call accelerations_of_groups(s, bodies%motion - self%counted, self)
+      self%counted = bodies%motion
+      call add_product(grid, s%dt, a%cell, flow%u)
+      call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
+                            from_faces)
+      self%total = self%total + from_faces
+      call force_of_walls(grid, self%merged, bodies, self%at_start, s%dt, self%balance, of_walls)
+      call leave_counted(s%dt, self, of_walls)
+    end associate
+  end subroutine solve_once
+
+  !> Stage 14: the velocity of all the fluid in a face, held fluid included, and the flux of the
+  !! solids; what is left of the force of the walls acts in the next step.
+  subroutine close_faces(self, s, blocks, report)
+    class(monolithic_t), intent(inout) :: self
+    type(stage_t), intent(in) :: s
     type(blocks_t), intent(inout) :: blocks
     type(coupling_report_t), intent(inout) :: report
 
     associate (unused => report)
     end associate
     blocks%lagged_force = self%lagged(:, :blocks%n)
-    call all_fluid_of_faces(grid, solid, self%bodies, self%pressure%system%operator%flux, &
-                            flow%uf, flow%solid_flux)
+    call all_fluid_of_faces(s%grid, s%solid, self%bodies, self%pressure%system%operator%flux, &
+                            s%flow%uf, s%flow%solid_flux)
   end subroutine close_faces
 
   !> Take from the forces of the walls what they bear as the fluid that no aperture counts moves
@@ -425,34 +418,6 @@ contains
         self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
     end do
   end subroutine leave_counted
-
-  !> Report of two solves of a step.
-  pure function added(first, second) result(both)
-    type(pressure_report_t), intent(in) :: first, second
-    type(pressure_report_t) :: both
-
-    both = second
-    both%passes = first%passes + second%passes
-    both%iterations = first%iterations + second%iterations
-  end function added
-
-  !> What the new pressure does to the cells.
-  subroutine correct_cells(grid, solid, dt, flow, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    class(monolithic_t), intent(inout) :: self
-    real(wp), parameter :: weightless(3) = 0.0_wp
-
-    associate (a => self%acceleration)
-      call face_acceleration(grid, weightless, self%rho, self%rho, self%pressure%phi_total, &
-                             a%face, flow%sides)
-      call accelerations_of_groups(grid, solid, dt, self%bodies%motion - self%counted, self)
-      self%counted = self%bodies%motion
-      call add_product(grid, dt, a%cell, flow%u)
-    end associate
-  end subroutine correct_cells
 
   !> Force and torque of the step on each body, the inertia of the fluid that no face counts
   !! included, by the acceleration that the solve has found.
@@ -505,25 +470,26 @@ contains
 
   !> Force and torque of the fluid on bodies that are let go, with the pressure by which they
   !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.
-  subroutine force_at_release(self, grid, solid, begins, flow, scratch, force)
+  subroutine force_at_release(self, s, begins, force)
     class(monolithic_t), intent(inout) :: self   !! its bodies in place
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    logical, intent(in) :: begins(:)         !! (blocks) those let go; all others are held
-    type(flow_t), intent(inout) :: flow      !! only its pressure changes
-    type(scratch_t), intent(inout) :: scratch
-    real(wp), intent(out) :: force(:, :)     !! (6, bodies), of those let go [N, N m]
+    type(stage_t), intent(in) :: s               !! of its flow only the pressure changes
+    logical, intent(in) :: begins(:)             !! (blocks) those let go; all others are held
+    real(wp), intent(out) :: force(:, :)         !! (6, bodies), of those let go [N, N m]
     real(wp), parameter :: weightless(3) = 0.0_wp
     real(wp), allocatable :: uf(:, :, :, :), solid_flux(:, :, :, :)
+    type(stage_t) :: release
     type(rigid_motion_t) :: moving
     real(wp) :: a(6)
     integer :: b
 
+    release = s
+    release%dt = self%dt_release
     moving = self%bodies
-    allocate (uf, source=flow%uf)
-    allocate (solid_flux, source=flow%solid_flux)
-    call displaced_force(grid, self%fluid, solid, self%bodies, flow%c, force)
-    associate (bodies => self%bodies, system => self%pressure%system, dt => self%dt_release)
+    associate (grid => s%grid, solid => s%solid, flow => s%flow, dt => release%dt, &
+               bodies => self%bodies, system => self%pressure%system)
+      allocate (uf, source=flow%uf)
+      allocate (solid_flux, source=flow%solid_flux)
+      call displaced_force(grid, self%fluid, solid, bodies, flow%c, force)
       bodies%motion = 0.0_wp
       do b = 1, bodies%n
         bodies%free(b) = .false.
@@ -531,26 +497,23 @@ contains
         force(1:3, b) = force(1:3, b) + bodies%mass(b)*self%fluid%gravity
       end do
       self%at_start = bodies
-      call take_faces(scratch, system%operator%cf)
       call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
       self%defect = mass_defect(grid, self%fluid, solid, bodies, system%operator%flux, flow)
       call count_fluid(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
-      self%pressure%rough = .false.
-      call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, self%pressure)
+      call solve_pressure(release, flow%rho, bodies, self%pressure)
       do b = 1, bodies%n
         a = bodies%motion(:, b)/dt
         force(1:3, b) = bodies%mass(b)*(a(1:3) - self%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
       end do
       call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, self%pressure)
-      call give_faces(scratch, system%operator%cf)
+      self%bodies = moving
+      call move_alloc(uf, s%flow%uf)
+      call move_alloc(solid_flux, s%flow%solid_flux)
     end associate
-    self%bodies = moving
-    call move_alloc(uf, flow%uf)
-    call move_alloc(solid_flux, flow%solid_flux)
   end subroutine force_at_release
 
   !> Cells in a body that hold no small cell move with it.

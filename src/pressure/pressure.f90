@@ -6,7 +6,7 @@ module pressure_m
   use kinds_m, only: wp
   use case_types_m, only: numerics_t
   use fields_m, only: flow_t
-  use solid_geometry_m, only: solid_geometry_t
+  use stage_m, only: stage_t
   use grid_m, only: grid_t
   use boundary_m, only: fill_scalar_halo
   use rigid_motion_m, only: rigid_motion_t
@@ -19,7 +19,7 @@ module pressure_m
   use parallel_m, only: global_max, halo_exchange
   implicit none
   private
-  public :: pressure_t, pressure_report_t, pressure_init, solve_pressure, divergence
+  public :: pressure_t, pressure_report_t, pressure_init, solve_pressure, both_solves, divergence
 
   type :: pressure_report_t
     integer :: passes = 0              !! of the C-HSMAC loop
@@ -28,12 +28,9 @@ module pressure_m
     logical :: converged = .false.
   end type pressure_report_t
 
-  real(wp), parameter :: rough_factor = 1.0e3_wp
-
   type :: pressure_t
     type(pressure_system_t) :: system
     real(wp) :: tolerance = 0.0_wp         !! of the divergence [1/s]
-    logical :: rough = .false.             !! the next solve may leave `rough_factor` times that
     integer :: max_passes = 0
     real(wp), allocatable :: phi_total(:, :, :)                      !! full halo [Pa]
     integer, allocatable :: known(:, :, :), closed(:, :)   !! work of `extend_pressure`
@@ -43,17 +40,16 @@ module pressure_m
 contains
 
   !> Allocate the system and what the loop needs.
-  subroutine pressure_init(grid, n_bodies, numerics, self, pooled)
+  subroutine pressure_init(grid, n_bodies, numerics, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_bodies
     type(numerics_t), intent(in) :: numerics
     type(pressure_t), intent(out) :: self
-    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3)
 
     self%tolerance = numerics%divergence_tolerance
     self%max_passes = numerics%max_pressure_passes
-    call pressure_system_init(grid, n_bodies, numerics, self%system, pooled)
+    call pressure_system_init(grid, n_bodies, numerics, self%system)
     a = grid%first
     b = grid%last
     allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
@@ -65,52 +61,65 @@ contains
   !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both
   !! are final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final
   !! motion; `self%report` holds how it went.
-  subroutine solve_pressure(grid, solid, rho, dt, flow, bodies, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+  subroutine solve_pressure(s, rho, bodies, self, tolerance)
+    type(stage_t), intent(in) :: s
+    real(wp), intent(in), contiguous :: rho(s%grid%first(1):, s%grid%first(2):, s%grid%first(3):)
       !! that of the system [kg/m3]
-    real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(inout) :: flow
     type(rigid_motion_t), intent(inout) :: bodies
     type(pressure_t), intent(inout) :: self
+    real(wp), intent(in), optional :: tolerance   !! of the divergence, in place of the usual [1/s]
     integer :: d, iterations, k
-    real(wp) :: allowed     !! divergence [1/s]
-    real(wp) :: tolerance   !! of the residual of the linear system [m3/s2]
+    real(wp) :: allowed   !! divergence [1/s]
+    real(wp) :: residual  !! of the linear system, allowed [m3/s2]
 
     self%report = pressure_report_t()
+    allowed = self%tolerance
+    if (present(tolerance)) allowed = tolerance
+    residual = 0.5_wp*allowed*s%grid%volume/s%dt
     call start_from_none(self%phi_total)
     do d = 1, 3
-      call start_from_none(flow%solid_flux(:, :, :, d))
+      call start_from_none(s%flow%solid_flux(:, :, :, d))
     end do
-    call set_bodies(grid, bodies, self%system)
-    allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
-    tolerance = 0.5_wp*allowed*grid%volume/dt
-    associate (system => self%system, report => self%report, rhs => self%system%solver%rhs, &
-               work => self%system%solver%work)
+    call set_bodies(s%grid, bodies, self%system)
+    associate (grid => s%grid, flow => s%flow, system => self%system, report => self%report, &
+               rhs => self%system%solver%rhs, work => self%system%solver%work)
       do
         call solid_face_flux(grid, bodies, system%operator%flux, flow%solid_flux, held=.true.)
-        call divergence(grid, solid%effective, flow, system%active, rhs, report%divergence)
+        call divergence(grid, s%solid%effective, flow, system%active, rhs, report%divergence)
         if (work%singular) report%divergence = uneven(grid, rhs, work)
         report%converged = report%divergence < allowed
         if (report%converged .or. report%passes == self%max_passes) exit
         call start_from_none(system%solver%x)
         !$omp parallel do schedule(static)
         do k = lbound(rhs, 3), ubound(rhs, 3)
-          rhs(:, :, k) = -rhs(:, :, k)/dt
+          rhs(:, :, k) = -rhs(:, :, k)/s%dt
         end do
-        call solve_linear(tolerance, system, iterations)
+        call solve_linear(residual, system, iterations)
         report%passes = report%passes + 1
         report%iterations = report%iterations + iterations
-        call add_correction(grid, rho, dt, bodies, flow, self)
+        call add_correction(grid, rho, s%dt, bodies, flow, self)
+      end do
+      call fill_scalar_halo(grid, self%phi_total, layers=1)
+      !$omp parallel do schedule(static)
+      do k = grid%first(3), grid%last(3)
+        flow%p(:, :, k) = flow%p(:, :, k) + self%phi_total(:, :, k)
       end do
     end associate
-    call fill_scalar_halo(grid, self%phi_total, layers=1)
-    !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      flow%p(:, :, k) = flow%p(:, :, k) + self%phi_total(:, :, k)
-    end do
   end subroutine solve_pressure
+
+  !> Report of two solves of a step, of which the second goes on from the first. What the first left
+  !! undone is told, too.
+  pure function both_solves(first, second) result(both)
+    type(pressure_report_t), intent(in) :: first, second
+    type(pressure_report_t) :: both
+
+    both = second
+    both%passes = first%passes + second%passes
+    both%iterations = first%iterations + second%iterations
+    if (first%converged) return
+    both%converged = .false.
+    both%divergence = max(first%divergence, second%divergence)
+  end function both_solves
 
   !> Zero everywhere.
   subroutine start_from_none(phi)

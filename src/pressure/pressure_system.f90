@@ -57,12 +57,11 @@ module pressure_system_m
 contains
 
   !> Allocate the system and its solvers.
-  subroutine pressure_system_init(grid, n_bodies, numerics, self, pooled)
+  subroutine pressure_system_init(grid, n_bodies, numerics, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_bodies
     type(numerics_t), intent(in) :: numerics   !! names of solver and preconditioner
     type(pressure_system_t), intent(out) :: self
-    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3)
 
     call require_names(numerics)
@@ -70,9 +69,7 @@ contains
     self%preconditioner = numerics%preconditioner
     a = grid%lo - 1
     b = grid%hi + 1
-    if (.not. present(pooled)) then
-      allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    end if
+    allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%operator%push(6, n_bodies), source=0.0_wp)
     allocate (self%operator%wall_share, source=self%operator%push)
     a = grid%first

@@ -1,7 +1,7 @@
 !> How much memory a run will take, and whether it can have that.
 !!
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
-!! and both couplings (gfortran 12): 510 to 780 B for a cell, those of the halo counted, 1200 B
+!! and both couplings (gfortran 12): 550 to 820 B for a cell, those of the halo counted, 1240 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
 !! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell.
 module memory_plan_m
@@ -16,7 +16,7 @@ module memory_plan_m
   private
   public :: planned_memory, require_memory, require_memory_to_start, size_text
 
-  integer(i8), parameter :: bytes_per_cell = 810       !! all arrays: fields, solids, solvers [B]
+  integer(i8), parameter :: bytes_per_cell = 850       !! all arrays: fields, solids, solvers [B]
   integer(i8), parameter :: bytes_of_c_ismac = 470     !! more for each cell [B]
   integer(i8), parameter :: bytes_of_landing = 36      !! more for each cell where blocks land [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]

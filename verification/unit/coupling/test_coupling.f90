@@ -3,7 +3,8 @@ module test_coupling_m
   use kinds_m, only: wp
   use vectors_m, only: quaternion_from_axis
   use rigid_body_m, only: begin_step
-  use scratch_m, only: scratch_t, scratch_init, take
+  use scratch_m, only: scratch_t, scratch_init
+  use stage_m, only: stage_t
   use monolithic_m, only: monolithic_t, monolithic_init
   use flow_start_m, only: start_flow
   use rigid_motion_m, only: set_inertia
@@ -18,10 +19,11 @@ module test_coupling_m
   character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
     'slip', 'slip', 'slip', 'slip', 'slip', 'open'], [2, 3])
   real(wp), parameter :: dt = 1.0e-3_wp, g = 9.81_wp
-  type(one_body_t) :: block
+  type(one_body_t), target :: block
   type(monolithic_t) :: coupling
   type(coupling_report_t) :: report
-  type(scratch_t) :: scratch
+  type(scratch_t), target :: scratch
+  logical :: begun = .false.   !! has `begin` gone before?
 
 contains
 
@@ -72,37 +74,45 @@ contains
     call scratch_init(block%grid, scratch)
     call monolithic_init(block%grid, 1, block%case, coupling)
     call copy_motion(block%blocks, coupling%bodies)
-    call start_flow(block%case, block%grid, block%solid, block%flow, scratch, coupling, &
-                    converged)
+    call start_flow(stage(), coupling, converged)
     call check('the start converged', converged)
     call fill_velocity_halo(block%grid, block%flow%u)
   end subroutine ready
 
-  !> Nothing has been given before the transport, and the faces are as their cells.
-  subroutine begin_without_past()
-    call take(scratch, coupling%correction)
-    call take(scratch, coupling%given)
-    coupling%correction = 0.0_wp
-    coupling%given = 0.0_wp
-  end subroutine begin_without_past
+  function stage() result(s)
+    type(stage_t) :: s
+
+    s = stage_t(block%grid, block%solid, block%flow, scratch, dt)
+  end function stage
+
+  subroutine begin()
+    call coupling%begin(stage(), block%blocks)
+    begun = .true.
+  end subroutine begin
 
   !> The stages of a step after the transport, of which `begin` may have gone before.
   subroutine advance()
-    if (.not. allocated(coupling%correction)) call begin_without_past()
     call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
     call stages()
     call motion_after_fluid(block%case%fluid%gravity, dt, block%blocks, coupling)
-    call coupling%close(block%grid, block%solid, block%flow, block%blocks, report)
+    call coupling%close(stage(), block%blocks, report)
   end subroutine advance
 
-  !> Those between two looks at the motion of the block.
+  !> Those between two looks at the motion of the block. Without `begin` nothing has been given
+  !! before the transport, and the faces are as their cells.
   subroutine stages()
     report = coupling_report_t()
-    call coupling%merge_cells(block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%add_forces(block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%add_viscosity(block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%predict_faces(block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%project(block%grid, block%solid, dt, block%flow, scratch, report)
+    if (.not. begun) then
+      coupling%correction = 0.0_wp
+      coupling%given = 0.0_wp
+    end if
+    begun = .false.
+    call coupling%average_momentum(stage())
+    call coupling%build_pressure_system(stage())
+    call coupling%add_forces(stage())
+    call coupling%add_viscosity(stage())
+    call coupling%predict_faces(stage())
+    call coupling%project(stage(), report)
   end subroutine stages
 
   !> Before its first step the sphere has the force of that fall, and the fluid the pressure of it,
@@ -118,7 +128,7 @@ contains
     call ready()
     allocate (p, source=block%flow%p)
     allocate (uf, source=block%flow%uf)
-    call coupling%force_at_release(block%grid, block%solid, [.true.], block%flow, scratch, force)
+    call coupling%force_at_release(stage(), [.true.], force)
     a(1:3) = force(1:3, 1)/block%blocks%mass(1) - [0.0_wp, 0.0_wp, g]
     expected = (s - 1.0_wp)/(s + 0.5_wp)
     call check('let go: acceleration', -a(3)/g, expected, 0.02_wp*abs(expected))
@@ -133,7 +143,7 @@ contains
     block%blocks%fluid_force(:, 1) = force(1:3, 1)
     block%blocks%fluid_torque(:, 1) = force(4:6, 1)
     call begin_step(block%blocks)
-    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
+    call begin()
     call advance()
     call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
                0.02_wp*abs(expected))
@@ -170,7 +180,6 @@ contains
     block%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
     call ready()
     call begin_step(block%blocks)
-    call begin_without_past()
     call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
     motion = coupling%bodies%motion(:, 1)
     coupling%at_start = coupling%bodies
@@ -340,7 +349,7 @@ contains
     block%blocks%contact_torque(:, 1) = forces(:, 4)
     gain(1:3) = block%case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
-    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
+    call begin()
     call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
                1.0e-12_wp)
   end subroutine goes_on_as_before

@@ -9,7 +9,9 @@ module test_pressure_m
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
     cell_mean_of_faces, predict_face_velocity
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
+  use stage_m, only: stage_t
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init, solve_pressure, both_solves, &
+    divergence
   use pressure_extension_m, only: extend_pressure
   use advected_pressure_m, only: advect_pressure
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -28,7 +30,7 @@ module test_pressure_m
   real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
   real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
-  type(one_body_t) :: box
+  type(one_body_t), target :: box
   type(pressure_t) :: pressure
   type(acceleration_t) :: a
   integer :: seed = 77
@@ -94,17 +96,22 @@ contains
     end associate
   end subroutine stir
 
-  subroutine solve(rough)
-    logical, intent(in), optional :: rough
+  subroutine solve(tolerance)
+    real(wp), intent(in), optional :: tolerance   !! [1/s]
 
     call pressure_init(box%grid, 1, box%case%numerics, pressure)
-    if (present(rough)) pressure%rough = rough
     associate (system => pressure%system)
       call set_pressure_system(box%grid, box%solid%effective, box%flow%rho, system)
       call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
     end associate
-    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
+    call solve_pressure(stage(), box%flow%rho, box%bodies, pressure, tolerance)
   end subroutine solve
+
+  function stage() result(s)
+    type(stage_t) :: s
+
+    s = stage_t(grid=box%grid, solid=box%solid, flow=box%flow, dt=dt)
+  end function stage
 
   !> Largest |div u| of fluid and solid in the cells that can move, worked out here [1/s].
   function largest_divergence() result(worst)
@@ -160,21 +167,27 @@ contains
   !> A rough solve leaves more divergence with less work, and a second one goes on from there.
   subroutine rough_and_fine()
     integer :: rough
+    type(pressure_report_t) :: both
 
     call build(tank, .false.)
     box%case%numerics%pressure_solver = 'cg'
     box%case%numerics%preconditioner = 'multigrid'
-    call solve(rough=.true.)
+    call solve(tolerance=1.0e-5_wp)
     rough = pressure%report%iterations
     call check('rough: converged', pressure%report%converged)
     call check('rough: divergence', largest_divergence() < 1.0e3_wp*1.0e-8_wp &
                .and. largest_divergence() > 1.0e-8_wp)
-    pressure%rough = .false.
-    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
+    call solve_pressure(stage(), box%flow%rho, box%bodies, pressure)
     call check('then fine: divergence', largest_divergence() < 1.0e-8_wp)
     call build(tank, .false.)
     call solve()
     call check('rough is less work', rough < pressure%report%iterations)
+    both = both_solves(pressure_report_t(3, 20, 0.5_wp, .false.), pressure%report)
+    call check('a first solve without end is told', .not. both%converged)
+    call check('both: divergence of the first', both%divergence, 0.5_wp, 0.0_wp)
+    both = both_solves(pressure_report_t(3, 20, 0.5_wp, .true.), pressure%report)
+    call check('a rough one that ended counts as work only', both%converged &
+               .and. both%passes == 3 + pressure%report%passes .and. both%divergence < 1.0e-8_wp)
   end subroutine rough_and_fine
 
   !> A solve that leaves the body of the run aside knows nothing of the flux that it had before.
@@ -187,7 +200,7 @@ contains
     call stir()
     none%n = 0
     allocate (none%free(0))
-    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, none, pressure)
+    call solve_pressure(stage(), box%flow%rho, none, pressure)
     call check('without it: none', all(abs(box%flow%solid_flux) <= 0.0_wp))
     call check('without it: divergence', largest_divergence() < 1.0e-8_wp)
   end subroutine without_its_body
