@@ -1,16 +1,12 @@
 !> Whole steps: still water, length of the step, a release, noise in gas, a fall without fluid.
 module test_step_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t, water_t
-  use tet_mesh_m, only: shape_t
-  use bed_m, only: bed_t
-  use shapes_builtin_m, only: make_shape
+  use errors_m, only: to_text
   use liquid_fill_m, only: liquid_volume
-  use diagnostics_m, only: step_report_t
-  use simulation_m, only: simulation_t, simulation_init, resume
-  use step_m, only: take_step
+  use simulation_m, only: resume
   use boundary_m, only: fill_scalar_halo
   use one_body_m, only: random_numbers
+  use world_m, only: world_t, set_up, body, run
   use check_m, only: check
   implicit none
   private
@@ -36,53 +32,38 @@ contains
     call go_on_from_the_state()
   end subroutine test_step
 
-  !> A tank half full, with boxes of 4 cm.
-  subroutine tank(n_bodies, case)
-    integer, intent(in) :: n_bodies
-    type(case_t), intent(out) :: case
+  !> Groups in a tank half full, with boxes of 4 cm; other variables of &run and &fluid.
+  subroutine tank(groups, sim, variables, fluid)
+    character(*), intent(in) :: groups
+    type(world_t), intent(out) :: sim
+    character(*), intent(in), optional :: variables, fluid   !! else dt=2e-3, water_level=.0613
+    character(:), allocatable :: text
 
-    case%run%t_end = 1.0_wp
-    case%run%dt = 2.0e-3_wp
-    case%grid%cells = [12, 8, 12]
-    case%grid%length = [0.12_wp, 0.08_wp, 0.12_wp]
-    case%fluid%water_level = 0.0613_wp
-    case%numerics%divergence_tolerance = 1.0e-8_wp
-    allocate (case%shape(1), case%body(n_bodies), case%drop(0), case%water(0))
-    case%shape(1)%name = 'box'
-    case%shape(1)%kind = 'box'
-    case%shape(1)%size = [0.04_wp, 0.03_wp, 0.035_wp]
-    case%body%shape = 'box'
+    text = '&run t_end=1 dt=2e-3'
+    if (present(variables)) text = '&run t_end=1 '//variables
+    if (present(fluid)) then
+      text = text//'/ &fluid '//fluid
+    else if (index(text, 'dry') == 0) then
+      text = text//'/ &fluid water_level=.0613'
+    end if
+    if (index(groups, '&grid') == 0) text = text//'/ &grid cells=12,8,12 length=.12,.08,.12'
+    if (index(groups, '&numerics') == 0) text = text//'/ &numerics divergence_tolerance=1e-8'
+    if (index(groups, &
+      '&shape') == 0) text = text//'/ &shape name="box" kind="box" size=.04,.03,.035'
+    call set_up(text//'/ '//groups, sim)
   end subroutine tank
-
-  subroutine start(case, sim)
-    type(case_t), intent(in) :: case
-    type(simulation_t), intent(inout) :: sim
-    type(shape_t) :: shapes(1)
-    type(bed_t) :: no_bed
-    character(:), allocatable :: message
-
-    call make_shape(case%shape(1), shapes(1), message)
-    call simulation_init(case, shapes, no_bed, sim)
-  end subroutine start
 
   !> A held block through the level: nothing moves, no liquid is lost, and it is carried.
   subroutine still_water()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp) :: before, mass
-    integer :: step
 
-    call tank(1, case)
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.0571_wp]
-    case%body(1)%fixed = .true.
-    call start(case, sim)
+    call tank('&body shape="box" position=.0613,.0389,.0571 fixed=T/', sim)
     before = liquid_volume(sim%grid, sim%flow%liquid)
-    do step = 1, 3
-      call take_step(sim, report)
-    end do
+    call run(sim, 3)
     mass = 0.04_wp*0.03_wp*(998.2_wp*(0.0613_wp - 0.0396_wp) + 1.204_wp*(0.0746_wp - 0.0613_wp))
-    call check('still water: converged', report%pressure_converged .and. report%viscous_converged)
+    call check('still water: converged', sim%report%pressure_converged .and. &
+      sim%report%viscous_converged)
     call check('still water: three steps', sim%clock%t, 6.0e-3_wp, 1.0e-15_wp)
     call check('still water: no motion', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, :))), 0.0_wp, &
                1.0e-8_wp)
@@ -95,20 +76,12 @@ contains
 
   !> Water at rest at the level an outflow keeps, and a held block that sticks out of that side.
   subroutine water_beside_outflow()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp) :: weight
-    integer :: step
 
-    call tank(1, case)
-    case%boundary%kind(2, 1) = 'outflow'
-    case%body(1)%position = [0.1113_wp, 0.0389_wp, 0.0371_wp]   ! 1.1 of 4 cm outside
-    case%body(1)%fixed = .true.
-    call start(case, sim)
-    do step = 1, 3
-      call take_step(sim, report)
-    end do
+    call tank('&boundary x_max="outflow"/ &body shape="box" position=.1113,.0389,.0371 fixed=T/', &
+      sim)   ! 1.1 of 4 cm outside
+    call run(sim, 3)
     weight = 998.2_wp*g*0.04_wp*0.03_wp*0.035_wp
     call check('outflow: water at rest', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, :))), 0.0_wp, &
                1.0e-8_wp)
@@ -119,21 +92,14 @@ contains
 
   !> In by one side and out by the other; the liquid of the balance is that of the level.
   subroutine uniform_current()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp), parameter :: speed = 0.3_wp   !! [m/s]
     integer :: step
 
-    call tank(0, case)
-    case%boundary%kind(:, 1) = [character(8) :: 'outflow', 'inflow']
-    case%boundary%kind(:, 2) = 'slip'
-    case%boundary%kind(1, 3) = 'slip'
-    case%boundary%velocity(1, 2, 1) = -speed
-    case%fluid%velocity(1) = -speed
-    call start(case, sim)
+    call tank('&boundary x_min="outflow" x_max="inflow" y_min="slip" y_max="slip" z_min="slip" ' &
+      //'x_max_velocity=-.3,0,0/', sim, fluid='water_level=.0613 velocity=-.3,0,0')
     do step = 1, 5
-      call take_step(sim, report)
+      call run(sim, 1)
       call check('current: stays uniform', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, 1) + speed)) &
                  + maxval(abs(sim%flow%u(1:12, 1:8, 1:12, 2:3))), 0.0_wp, 1.0e-8_wp)
     end do
@@ -145,24 +111,14 @@ contains
   !> A block that is moved at a constant rate does so whatever pushes, feels the water, and the
   !! water is kept.
   subroutine moved_block()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp), parameter :: rate(3) = [0.2_wp, -0.1_wp, 0.15_wp], spin(3) = [0.0_wp, 0.0_wp, 5.0_wp]
     real(wp), parameter :: place(3) = [0.0613_wp, 0.0389_wp, 0.0571_wp]
     real(wp) :: before
-    integer :: step
 
-    call tank(1, case)
-    case%body(1)%position = place
-    case%body(1)%fixed = .true.
-    case%body(1)%velocity = rate
-    case%body(1)%angular_velocity = spin
-    call start(case, sim)
+    call tank(body('box', place, rate, more='fixed=T angular_velocity=0,0,5'), sim)
     before = liquid_volume(sim%grid, sim%flow%liquid)
-    do step = 1, 5
-      call take_step(sim, report)
-    end do
+    call run(sim, 5)
     call check('moved block: place', maxval(abs(sim%blocks%x(:, 1) - place - rate*sim%clock%t)), &
                0.0_wp, 1.0e-14_wp)
     call check('moved block: speed', maxval(abs(sim%blocks%v(:, 1) - rate)), 0.0_wp, 0.0_wp)
@@ -170,31 +126,23 @@ contains
                1.0e-14_wp)
     call check('moved block: water', liquid_volume(sim%grid, sim%flow%liquid), before, &
                1.0e-13_wp*before)
-    call check('moved block: divergence', report%divergence_max <= 1.0e-8_wp)
+    call check('moved block: divergence', sim%report%divergence_max <= 1.0e-8_wp)
     call check('moved block: feels the water', norm2(sim%blocks%fluid_force(:, 1)) > 0.1_wp)
   end subroutine moved_block
 
   !> Odd numbers of cells, one of them across: a slice between slip walls is the same as one between
   !! periodic sides, and nothing moves across it.
   subroutine slice_with_odd_cells()
-    type(case_t) :: case
-    type(simulation_t) :: sim(2)
-    type(step_report_t) :: report
-    integer :: step, n
+    type(world_t) :: sim(2)
+    integer :: n
     character(8), parameter :: kind(2) = [character(8) :: 'slip', 'periodic']
 
     do n = 1, 2
-      call tank(0, case)
-      case%grid%cells = [13, 1, 11]
-      case%grid%length(2) = 0.01_wp
-      case%boundary%kind(:, 2) = kind(n)
-      case%fluid%water_level = -1.0_wp
-      case%water = [water_t(min=[0.0_wp, -1.0_wp, 0.0_wp], max=[0.051_wp, 1.0_wp, 0.083_wp])]
-      call start(case, sim(n))
-      do step = 1, 10
-        call take_step(sim(n), report)
-      end do
-      call check('slice: converged', report%pressure_converged .and. report%viscous_converged)
+      call tank('&grid cells=13,1,11 length=.12,.01,.12/ &boundary y_min="'//trim(kind(n)) &
+        //'" y_max="'//trim(kind(n))//'"/ &water min=0,-1,0 max=.051,1,.083/', sim(n), fluid='')
+      call run(sim(n), 10)
+      call check('slice: converged', sim(n)%report%pressure_converged &
+                 .and. sim(n)%report%viscous_converged)
       call check('slice: water falls', minval(sim(n)%flow%u(1:13, 1, 1:11, 3)) < -0.02_wp)
       call check('slice: nothing across', maxval(abs(sim(n)%flow%u(1:13, 1, 1:11, 2))), 0.0_wp, &
                  1.0e-15_wp)
@@ -208,46 +156,35 @@ contains
 
   !> Steps obey the Courant number of fluid and blocks, and land on a release.
   subroutine length_of_steps()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
 
-    call tank(2, case)
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.09_wp]
-    case%body(1)%velocity = [0.0_wp, 0.0_wp, -4.0_wp]
-    case%body(2)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
-    case%body(2)%release_time = 2.0e-3_wp
-    call start(case, sim)
-    call take_step(sim, report)
+    call tank('&body shape="box" position=.0613,.0389,.09 velocity=0,0,-4/ ' &
+      //'&body shape="box" position=.0613,.0389,.03 release_time=2e-3/', sim)
+    call run(sim, 1)
     call check('a fast block shortens the step', sim%clock%dt <= 0.5_wp*0.01_wp/6.0_wp)
-    call check('Courant number', report%cfl <= 0.5_wp + 1.0e-12_wp)
+    call check('Courant number', sim%report%cfl <= 0.5_wp + 1.0e-12_wp)
     call check('not released before its time', .not. sim%blocks%present(2))
     do while (sim%clock%t < 2.0e-3_wp - 1.0e-9_wp)
-      call take_step(sim, report)
+      call run(sim, 1)
     end do
     call check('a step ends at the release', sim%clock%t, 2.0e-3_wp, 1.0e-12_wp)
-    call take_step(sim, report)
+    call run(sim, 1)
     call check('released', sim%blocks%present(2))
   end subroutine length_of_steps
 
   !> With fluid a step is at most twice as long as the one before, whatever the case allows.
   subroutine growth_of_steps()
-    type(case_t) :: case
-    type(simulation_t) :: sim(2)
-    type(step_report_t) :: report
+    type(world_t) :: sim(2)
     character(7), parameter :: physics(2) = [character(7) :: 'coupled', 'dry']
     real(wp), parameter :: short = 1.0e-4_wp   !! [s]
     integer :: n
 
     do n = 1, 2
-      call tank(0, case)
-      case%run%physics = physics(n)
-      case%run%dt = short
-      call start(case, sim(n))
-      call take_step(sim(n), report)
+      call tank('', sim(n), 'dt=1e-4 physics="'//trim(physics(n))//'"')
+      call run(sim(n), 1)
       call check('growth: the first step', sim(n)%clock%dt, short, 1.0e-9_wp*short)
       sim(n)%case%run%dt = 10.0_wp*short
-      call take_step(sim(n), report)
+      call run(sim(n), 1)
       call check('growth: the second, '//physics(n), sim(n)%clock%dt, merge(2, 10, n == 1)*short, &
                  1.0e-3_wp*short)
     end do
@@ -255,38 +192,27 @@ contains
 
   !> A ball that spins moves its surface, not the fluid; its surface speed counts all the same.
   subroutine spinning_ball()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp), parameter :: spin = 400.0_wp   !! [rad/s]
 
-    call tank(1, case)
-    case%shape(1)%kind = 'sphere'
-    case%shape(1)%size = [0.04_wp, 0.0_wp, 0.0_wp]
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
-    case%body(1)%angular_velocity = [0.0_wp, spin, 0.0_wp]
-    call start(case, sim)
-    call take_step(sim, report)
+    call tank('&shape name="ball" kind="sphere" size=.04/ &body shape="ball" ' &
+      //'position=.0613,.0389,.03 angular_velocity=0,400,0/', sim)
+    call run(sim, 1)
     call check('a spinning ball shortens the step', sim%clock%dt, &
                0.5_wp*0.01_wp/(1.5_wp*spin*0.02_wp), 0.02_wp*0.01_wp/(spin*0.02_wp))
   end subroutine spinning_ball
 
   !> The liquid in the place of a released block is not lost.
   subroutine release_into_water()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
+    type(world_t) :: sim
     real(wp) :: before, row(2)
 
-    call tank(1, case)
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
-    case%body(1)%release_time = 2.0e-3_wp
-    call start(case, sim)
+    call tank('&body shape="box" position=.0613,.0389,.03 release_time=2e-3/', sim)
     before = liquid_volume(sim%grid, sim%flow%liquid)
     row(1) = sum(sim%flow%liquid(1:12, 1:8, 7))
-    call take_step(sim, report)
+    call run(sim, 1)
     call check('before: full tank', before, 0.12_wp*0.08_wp*0.0613_wp, 1.0e-14_wp*before)
-    call take_step(sim, report)
+    call run(sim, 1)
     row(2) = sum(sim%flow%liquid(1:12, 1:8, 7))
     call check('release: it is there', sim%blocks%present(1))
     call check('release: volume', liquid_volume(sim%grid, sim%flow%liquid), before, &
@@ -306,7 +232,7 @@ contains
     real(wp), intent(in) :: most        !! change, in that unit
     real(wp), parameter :: noise = 1.0e5_wp   !! [Pa]
     real(wp) :: unit, change
-    type(simulation_t) :: calm, noisy
+    type(world_t) :: calm, noisy
 
     call fall_into_water(viscosity, 0.0_wp, calm)
     call fall_into_water(viscosity, noise, noisy)
@@ -321,27 +247,16 @@ contains
   !! of cells with more gas than liquid gets noise.
   subroutine fall_into_water(viscosity, noise, sim)
     real(wp), intent(in) :: viscosity, noise   !! over that of water and air; [Pa]
-    type(simulation_t), intent(inout) :: sim
-    type(case_t) :: case
-    type(step_report_t) :: report
+    type(world_t), intent(inout) :: sim
     real(wp) :: r(12)
-    integer :: seed, step, j, k
+    integer :: seed, j, k
 
-    call tank(1, case)
-    case%run%dt = 0.02_wp
-    case%grid%length = 0.4_wp*case%grid%cells
-    case%shape(1)%size = [2.0_wp, 1.5_wp, 1.75_wp]
-    case%fluid%water_level = 2.452_wp
-    case%fluid%liquid_viscosity = viscosity*case%fluid%liquid_viscosity
-    case%fluid%gas_viscosity = viscosity*case%fluid%gas_viscosity
-    case%numerics%divergence_tolerance = 1.0e-9_wp
-    case%body(1)%position = [2.452_wp, 1.556_wp, 2.684_wp]
-    case%body(1)%velocity = [0.3_wp, 0.0_wp, -4.0_wp]
-    case%body(1)%angular_velocity = [0.2_wp, 0.4_wp, 0.0_wp]
-    call start(case, sim)
-    do step = 1, 3
-      call take_step(sim, report)
-    end do
+    call tank('&grid cells=12,8,12 length=4.8,3.2,4.8/ &numerics divergence_tolerance=1e-9/ ' &
+      //'&shape name="box" kind="box" size=2,1.5,1.75/ &body shape="box" ' &
+      //'position=2.452,1.556,2.684 velocity=.3,0,-4 angular_velocity=.2,.4,0/', sim, 'dt=.02', &
+      'water_level=2.452 liquid_viscosity='//to_text(viscosity*1.002e-3_wp) &
+      //' gas_viscosity='//to_text(viscosity*1.82e-5_wp))
+    call run(sim, 3)
     seed = 7
     do k = 1, 12
       do j = 1, 8
@@ -351,31 +266,24 @@ contains
       end do
     end do
     call fill_scalar_halo(sim%grid, sim%flow%p)
-    call take_step(sim, report)
-    call check('noise in gas: converged', report%pressure_converged .and. report%viscous_converged)
+    call run(sim, 1)
+    call check('noise in gas: converged', sim%report%pressure_converged .and. &
+      sim%report%viscous_converged)
   end subroutine fall_into_water
 
   !> Without fluid a block falls by g t.
   subroutine fall_without_fluid()
-    type(case_t) :: case
-    type(simulation_t) :: sim
-    type(step_report_t) :: report
-    integer :: step
+    type(world_t) :: sim
 
-    call tank(1, case)
-    case%run%physics = 'dry'
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.08_wp]
-    call start(case, sim)
-    do step = 1, 10
-      call take_step(sim, report)
-    end do
+    call tank('&body shape="box" position=.0613,.0389,.08/', sim, 'dt=2e-3 physics="dry"')
+    call run(sim, 10)
     call check('dry: speed', sim%blocks%v(3, 1), -g*0.02_wp, 1.0e-14_wp)
     call check('dry: height', sim%blocks%x(3, 1), 0.08_wp - 0.5_wp*g*0.02_wp**2, 1.0e-15_wp)
   end subroutine fall_without_fluid
 
   !> What is worked out from the state is what a run without break has.
   subroutine go_on_from_the_state()
-    type(simulation_t) :: whole, broken
+    type(world_t) :: whole, broken
 
     call four_steps(0, whole)
     call four_steps(3, broken)
@@ -388,18 +296,13 @@ contains
   !> A block falls through the level; before one step the solids and halos are worked out anew.
   subroutine four_steps(anew, sim)
     integer, intent(in) :: anew   !! number of that step, 0: none
-    type(simulation_t), intent(inout) :: sim
-    type(case_t) :: case
-    type(step_report_t) :: report
+    type(world_t), intent(inout) :: sim
     integer :: step
 
-    call tank(1, case)
-    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.0771_wp]
-    case%body(1)%velocity = [0.1_wp, 0.0_wp, -0.5_wp]
-    call start(case, sim)
+    call tank('&body shape="box" position=.0613,.0389,.0771 velocity=.1,0,-.5/', sim)
     do step = 1, 4
-      if (step == anew) call resume(sim)
-      call take_step(sim, report)
+      if (step == anew) call resume(sim%simulation_t)
+      call run(sim, 1)
     end do
   end subroutine four_steps
 
