@@ -394,6 +394,13 @@ def test_few_rows_are_read_of_a_long_run(tmp_path: Path) -> None:
     assert few.release_time.tolist() == whole.release_time.tolist()
 
 
+def test_a_damaged_run_is_told_on_its_page(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", Motion(t_end=1.0))
+    (folder / "run.h5").write_bytes(b"<b>")
+    found = watch.Watched(folder).parts()
+    assert f"{folder}/run.h5: cannot be read" in found["parts"]["state"] and not found["running"]
+
+
 def begin(folder: Path, text: str = CASE) -> subprocess.Popen[bytes]:
     """A run of the program that takes long, once its first rows are there."""
     (folder / "case.nml").write_text(text)

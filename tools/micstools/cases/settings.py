@@ -226,7 +226,7 @@ def _word(value: Any) -> str:
 def _read(group: str) -> f90nml.Namelist:
     """A group as f90nml understands it."""
     try:
-        return namelist.read(group + "\n")
+        return namelist.read(group)
     except ValueError as error:
         raise BadRun(f"{' '.join(group.split())[:60]}: cannot be understood ({error})") from error
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from micstools.cases import case_copy, settings
 from micstools.cases.settings import Setting
+from micstools.reading import result_file
 from micstools.reading.reader import BadRun
 
 OUTCOMES = ("settled", "time over", "no room")
@@ -128,11 +129,9 @@ def state(member: Member) -> State:
     if not path.is_file():
         return State("failed", None, reason=last) if said else State("missing")
     try:
-        with h5py.File(path, "r", locking=False) as h5:
-            code = int(np.ravel(h5["provenance"].attrs["exit_status"])[0])
-            time = float(h5["series/time"][-1])
-    except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
-        return State("failed", None, reason=last or f"run.h5 cannot be read ({error})")
+        code, time = result_file.take(path, _end, waits=())
+    except BadRun as error:
+        return State("failed", None, reason=last or str(error))
     if code == 0:
         end = settings_end(member.text)
         return State("time over" if time >= end - 1e-9 else "settled", code, time)
@@ -141,6 +140,12 @@ def state(member: Member) -> State:
     if code in _INTERRUPTED:
         return State("interrupted", code, time, last)
     return State("failed", code, time, last)
+
+
+def _end(h5: h5py.File) -> tuple[int, float]:
+    """Exit status and last time [s]."""
+    status = np.ravel(h5["provenance"].attrs["exit_status"])[0]
+    return int(status), float(h5["series/time"][-1])
 
 
 def settings_end(text: str) -> float:

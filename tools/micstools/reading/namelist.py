@@ -20,6 +20,6 @@ def read(text: str) -> f90nml.Namelist:
     if _INDEX.search(plain):
         raise ValueError("variables have no index")
     try:
-        return f90nml.Parser().reads(text)
+        return f90nml.Parser().reads(text + "\n")  # else it prints its table of characters
     except Exception as error:  # f90nml raises what Python has for a text it cannot follow
         raise ValueError(type(error).__name__) from error

@@ -13,7 +13,6 @@ complete yet are left out, and `refresh` forgets what was read.
 
 import csv
 import html
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -26,7 +25,9 @@ from numpy.typing import NDArray
 
 from micstools.reading import namelist
 from micstools.reading.profiles import along_line
-from micstools.reading.schema import variables
+from micstools.reading.result_file import BadRun as BadRun
+from micstools.reading.result_file import indices, numbers, require_shape, rising, take
+from micstools.reading.schema import require_types, variables
 from micstools.shapes.geometry import Array, IntArray, place
 from micstools.shapes.shape import Shape
 
@@ -38,10 +39,6 @@ T = TypeVar("T")
 
 NOT_RESOLVED = "light: not resolved"
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
-
-
-class BadRun(Exception):
-    """What was given is not the results that are wanted; the text says what is wrong."""
 
 
 @dataclass(frozen=True)
@@ -223,15 +220,19 @@ class Run:
     @cached_property
     def provenance(self) -> dict[str, Any]:
         """How the run was made: the case, the version, the machine settings."""
-        return self._read("run.h5", lambda h5: {k: _plain(v) for k, v in _attributes(h5)})
+        return self._read("run.h5", _read_provenance)
 
     @cached_property
     def parameters(self) -> dict[str, list[dict[str, Any]]]:
         """All parameters of the case after defaults: for each group its occurrences in order."""
-        text = self.provenance.get("parameters") or self.provenance["namelist"]
+        text = self.provenance.get("parameters") or self.provenance.get("namelist")
         found: dict[str, list[dict[str, Any]]] = {}
-        for name, group in namelist.read(str(text)).items():
-            found.setdefault(str(name).lower(), []).append(dict(group))
+        try:
+            for name, group in namelist.read(str(text)).items():
+                require_types(str(name).lower(), dict(group))
+                found.setdefault(str(name).lower(), []).append(dict(group))
+        except ValueError as error:
+            raise BadRun(f"{self.folder / 'run.h5'}: its parameters: {error}") from error
         return found
 
     def value(self, group: str, name: str) -> Any:
@@ -283,7 +284,7 @@ class Run:
     @cached_property
     def grid(self) -> Grid:
         """The cells."""
-        return self._read("run.h5", lambda h5: Grid(*(h5[f"grid/{d}"][:] for d in "xyz")))
+        return self._read("run.h5", _read_grid)
 
     @cached_property
     def shapes(self) -> dict[str, Shape]:
@@ -412,21 +413,7 @@ class Run:
         return place(shape.points, b.position[row, body], b.quaternion[row, body])
 
     def _read(self, name: str, extract: Callable[[h5py.File], T]) -> T:
-        """Open a file, take something out of it and close it; a file may be caught mid-write."""
-        for wait in (0.1, 0.3, 1.0, 2.0):
-            try:
-                with h5py.File(self.folder / name, "r", locking=False) as h5:
-                    return extract(h5)
-            except (OSError, RuntimeError):
-                time.sleep(wait)
-            except KeyError as error:
-                text = str(error).strip("'\"")
-                raise BadRun(f"{self.folder / name}: not a whole result file ({text})") from error
-        try:
-            with h5py.File(self.folder / name, "r", locking=False) as h5:
-                return extract(h5)
-        except (OSError, RuntimeError) as error:
-            raise BadRun(f"{self.folder / name}: cannot be read ({error})") from error
+        return take(self.folder / name, extract)
 
 
 def _plain(value: Any) -> Any:
@@ -438,8 +425,16 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _attributes(h5: h5py.File) -> list[tuple[str, Any]]:
-    return list(h5["provenance"].attrs.items())
+def _read_provenance(h5: h5py.File) -> dict[str, Any]:
+    found = {name: _plain(value) for name, value in h5["provenance"].attrs.items()}
+    return found | {"exit_status": int(found.get("exit_status", -1))}
+
+
+def _read_grid(h5: h5py.File) -> Grid:
+    faces = [rising(numbers(h5["grid"], d, None), f"grid/{d}", strictly=True) for d in "xyz"]
+    if min(map(len, faces)) < 2:
+        raise ValueError("grid has no cell")
+    return Grid(*faces)
 
 
 def _text(value: Any) -> str:
@@ -451,13 +446,14 @@ def _read_shapes(h5: h5py.File) -> dict[str, Shape]:
 
 
 def _read_shape(name: str, group: h5py.Group) -> Shape:
+    points, centres = numbers(group, "points", None, 3), numbers(group, "sphere_centre", None, 3)
     return Shape(
         name=name,
-        points=group["points"][:],
-        triangles=group["triangles"][:].astype(np.int64),
-        tets=group["tets"][:].astype(np.int64),
-        sphere_centre=group["sphere_centre"][:],
-        sphere_radius=group["sphere_radius"][:],
+        points=points,
+        triangles=indices(numbers(group, "triangles", None, 3), "triangles", len(points)),
+        tets=indices(numbers(group, "tets", None, 4), "tets", len(points)),
+        sphere_centre=centres,
+        sphere_radius=numbers(group, "sphere_radius", len(centres)),
         volume=float(_plain(group.attrs["volume"])),
         inertia=np.asarray(group.attrs["inertia"]).reshape(3, 3),
         density=float(_plain(group.attrs["density"])),
@@ -467,7 +463,8 @@ def _read_shape(name: str, group: h5py.Group) -> Shape:
 def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
     if "bed" not in h5:
         return np.empty((0, 3)), np.empty((0, 3), dtype=int)
-    return h5["bed/points"][:], h5["bed/triangles"][:].astype(int)
+    points = numbers(h5["bed"], "points", None, 3)
+    return points, indices(numbers(h5["bed"], "triangles", None, 3), "bed", len(points))
 
 
 def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
@@ -476,17 +473,25 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     group = h5["bodies"]
     per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED)
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
+    mass = numbers(group, "mass", None)
+    n = len(mass)
+    for name in rows:
+        parts = {"quaternion": (n, 4), "time": (), "contacts": (n,), "on_floor": (n,)}
+        require_shape(group, name, None, *parts.get(name, (n, 3)))
     complete = min(len(group[name]) for name in rows)
     step = -(-complete // most) if most else 1
     values = {name: _thinned(group[name], complete, step) for name in rows}
+    rising(values["time"], "time")
+    shape = [_text(name) for name in group["shape"][:]]
+    names = [_text(name) for name in group.get("name", [""] * n)]
+    if len(shape) != n or len(names) != n or not set(shape) <= set(h5.get("shapes", {})):
+        raise ValueError("bodies and shapes do not belong together")
     return Bodies(
-        shape=[_text(name) for name in group["shape"][:]],
-        name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
-        mass=group["mass"][:],
-        fixed=group["fixed"][:].astype(bool),
-        planned=group["planned"][:]
-        if "planned" in group
-        else np.full((len(group["mass"]), 2), np.nan),
+        shape=shape,
+        name=names,
+        mass=mass,
+        fixed=numbers(group, "fixed", n).astype(bool),
+        planned=numbers(group, "planned", n, 2) if "planned" in group else np.full((n, 2), np.nan),
         **_handled(group, values, placed),
         **values,
     )
@@ -498,20 +503,22 @@ _HANDLED = ("release_time", "entry_time", "exit_time", "raised", "status")
 
 def _handled(group: h5py.Group, rows: dict[str, Array], placed: int) -> dict[str, Any]:
     """The values of `_HANDLED`; results of older programs have no more than release times."""
-    due = group["release_time"][:]
+    n = len(group["mass"])
+    due = numbers(group, "release_time", n)
     if "status" not in group:
         release = _true_release(due, rows, placed)
         status = np.where(np.isfinite(release), 2, 0)
         never = np.full(due.shape, np.inf)
         return dict(zip(_HANDLED, (release, release, never, 0 * due, status), strict=True))
-    status = group["status"][:].astype(int)
+    status = numbers(group, "status", n).astype(int)
     to_come = (status == 0) & (due > rows["time"][-1] if len(rows["time"]) else True)
     let_go = np.isin(status, (2, 4))
     release = np.where(let_go | to_come, due, np.inf)
-    entry = np.where((status == 1) | let_go, group["entry_time"][:], release)
-    left = group["exit_time"][:] if "exit_time" in group else np.full(due.shape, np.inf)
+    entry = np.where((status == 1) | let_go, numbers(group, "entry_time", n), release)
+    left = numbers(group, "exit_time", n) if "exit_time" in group else np.full(n, np.inf)
     left = np.where(status == 4, left, np.inf)
-    return dict(zip(_HANDLED, (release, entry, left, group["raised"][:], status), strict=True))
+    raised = numbers(group, "raised", n)
+    return dict(zip(_HANDLED, (release, entry, left, raised, status), strict=True))
 
 
 def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
@@ -536,9 +543,11 @@ def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:
 def _read_series(h5: h5py.File) -> Series:
     group = h5["series"]
     names = {f.name for f in fields(Series)}
-    complete = min(len(group[name]) for name in names & set(group))
+    found = {name: numbers(group, name, None) for name in names & set(group)}
+    complete = min(map(len, found.values()))
+    rising(found["time"][:complete], "series/time")
     missing = {name: np.full(complete, np.nan) for name in names - set(group)}  # of older versions
-    return Series(**missing, **{name: group[name][:complete] for name in names & set(group)})
+    return Series(**missing, **{name: values[:complete] for name, values in found.items()})
 
 
 def _read_timers(h5: h5py.File) -> dict[str, tuple[float, int]]:
@@ -551,7 +560,8 @@ def _read_timers(h5: h5py.File) -> dict[str, tuple[float, int]]:
 
 def _frame_times(h5: h5py.File) -> Array:
     steps = h5["VTKHDF/Steps"]
-    return np.asarray(steps["Values"][: int(_plain(steps.attrs["NSteps"]))])
+    times = numbers(steps, "Values", None)[: max(0, int(_plain(steps.attrs["NSteps"])))]
+    return np.asarray(rising(times, "times of the fields"))
 
 
 def _at_frame(h5: h5py.File, name: str, frame: int) -> Array:

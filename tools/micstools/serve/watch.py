@@ -35,6 +35,7 @@ class Watched:
         self.folder = folder
         self.lock = threading.Lock()
         self.run: Run | None = None
+        self.trouble = ""  # with its file
         self.began: object = None
         self.still: dict[str, Any] = {}  # of the scene
         self.columns: motion.Columns = {}
@@ -53,8 +54,8 @@ class Watched:
             if started != self.began:
                 self.began, self.still, self.columns = started, {}, {}
             return self.run if self.run.series.time.size and self.run.bodies.time.size else None
-        except (FileNotFoundError, BadRun):
-            self.run = None
+        except (FileNotFoundError, BadRun) as problem:
+            self.run, self.trouble = None, str(problem) if isinstance(problem, BadRun) else ""
             return None
 
     def parts(self) -> dict[str, Any]:
@@ -62,7 +63,8 @@ class Watched:
         with self.lock:
             run = self.look()
             if run is None:
-                return {"parts": watch_page.waiting(self.folder), "running": False, "key": ""}
+                parts = watch_page.waiting(self.folder, self.trouble)
+                return {"parts": parts, "running": False, "key": ""}
             found = living.state(run)
             key = f"{self.began} {run.series.time[-1]}"
             return {

@@ -131,9 +131,9 @@ def bar(share: float, words: str) -> Markup:
     return tag("progress", max=1, value=f"{share:.4f}", aria_label=words)
 
 
-def waiting(folder: Path) -> Parts:
-    """Before a run begins."""
-    return {"state": markup(f"Nothing in {folder} yet: waiting for the run to begin.")}
+def waiting(folder: Path, trouble: str) -> Parts:
+    """Before a run begins, or where its file cannot be read."""
+    return {"state": markup(trouble or f"Nothing in {folder} yet: waiting for the run to begin.")}
 
 
 def run_parts(run: Run, found: State) -> Parts:
