@@ -3,14 +3,9 @@
 module test_contact_detection_m
   use kinds_m, only: wp, pi
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
-  use walls_m, only: walls_t, walls_init
   use counterparts_m, only: update_counterparts
-  use substep_limits_m, only: longest_substep_of
-  use contact_detection_m, only: contact_detection_t, detection_init, detect_contacts
+  use contact_detection_m, only: detect_contacts
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_contact_detection
@@ -35,48 +30,33 @@ contains
   subroutine check_frequency(model)
     character(*), intent(in) :: model
     real(wp), parameter :: once = (pi/contact_time)**2, ahead = 2*gap/fast
-    type(case_t) :: case
-    type(shape_t) :: shapes(1)
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(contact_detection_t) :: detected
-    character(:), allocatable :: message
+    type(world_t) :: world
 
-    allocate (case%shape(1), case%body(2), case%drop(0))
-    case%grid%length = 1.0_wp
-    case%contact%model = model
-    case%contact%restitution = 1.0_wp
-    case%contact%contact_time = contact_time
-    case%shape%name = 'ball'
-    case%shape%kind = 'sphere'
-    case%shape(1)%size = 2*r
-    call make_shape(case%shape(1), shapes(1), message)
-    case%body%shape = 'ball'
-    case%body(1)%position = [0.5_wp, 0.5_wp, r + gap]
-    case%body(2)%position = [0.5_wp, 0.5_wp, 0.7_wp]
-    case%body(1)%velocity = [0.0_wp, 0.0_wp, -fast]
-    call blocks_init(case, shapes, blocks)
-    call walls_init(case%grid, case%boundary, walls)
-    call detection_init(case%contact, longest_substep_of(case%contact), blocks, detected)
-    call update_counterparts(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, detected%counterparts)
-    call check(model//': the model', detected%exact .eqv. model == 'surface')
-    call detect_contacts(walls, blocks, 0.0_wp, detected)
-    call check(model//': nothing touches', detected%points%n + detected%soon%n, 0)
-    call check(model//': and swings', detected%frequency2, 0.0_wp, 0.0_wp)
-    call detect_contacts(walls, blocks, ahead, detected)
-    call check(model//': but soon', all([detected%points%n, detected%soon%n] == [0, 1]))
-    call check(model//': it will swing', detected%frequency2, once, 1.0e-6_wp*once)
-    blocks%x(3, 1) = r - gap
-    call detect_contacts(walls, blocks, ahead, detected)
-    call check(model//': touches', all([detected%points%n, detected%soon%n] == [1, 0]))
-    call check(model//': swings', detected%frequency2, once, 1.0e-4_wp*once)
-    blocks%x(3, 2) = 3*r
-    blocks%v(3, 2) = -fast
-    blocks%v(3, 1) = fast
-    call detect_contacts(walls, blocks, ahead, detected)
-    call check(model//': one more soon', all([detected%points%n, detected%soon%n] == [1, 1]))
-    call check(model//': the ball between swings with both', detected%response%frequency2(1), &
-      2*once, 1.0e-4_wp*once)
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &contact model="'//model &
+      //'" restitution=1 contact_time=2e-3/ &shape name="ball" kind="sphere" size=.1/ ' &
+      //body('ball', [0.5_wp, 0.5_wp, r + gap], [0.0_wp, 0.0_wp, -fast]) &
+      //body('ball', [0.5_wp, 0.5_wp, 0.7_wp]), world)
+    associate (walls => world%walls, blocks => world%blocks, detected => world%contacts%detected)
+      call update_counterparts(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, detected%counterparts)
+      call check(model//': the model', detected%exact .eqv. model == 'surface')
+      call detect_contacts(walls, blocks, 0.0_wp, detected)
+      call check(model//': nothing touches', detected%points%n + detected%soon%n, 0)
+      call check(model//': and swings', detected%frequency2, 0.0_wp, 0.0_wp)
+      call detect_contacts(walls, blocks, ahead, detected)
+      call check(model//': but soon', all([detected%points%n, detected%soon%n] == [0, 1]))
+      call check(model//': it will swing', detected%frequency2, once, 1.0e-6_wp*once)
+      blocks%x(3, 1) = r - gap
+      call detect_contacts(walls, blocks, ahead, detected)
+      call check(model//': touches', all([detected%points%n, detected%soon%n] == [1, 0]))
+      call check(model//': swings', detected%frequency2, once, 1.0e-4_wp*once)
+      blocks%x(3, 2) = 3*r
+      blocks%v(3, 2) = -fast
+      blocks%v(3, 1) = fast
+      call detect_contacts(walls, blocks, ahead, detected)
+      call check(model//': one more soon', all([detected%points%n, detected%soon%n] == [1, 1]))
+      call check(model//': the ball between swings with both', detected%response%frequency2(1), &
+        2*once, 1.0e-4_wp*once)
+    end associate
   end subroutine check_frequency
 
 end module test_contact_detection_m

@@ -2,45 +2,24 @@
 module test_contact_load_m
   use kinds_m, only: wp
   use check_m, only: check
-  use case_types_m, only: contact_input_t, case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
+  use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, load_t, stiffness_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest
-  use rigid_body_m, only: blocks_t, blocks_init
-  use walls_m, only: walls_t
   use counterparts_m, only: counterparts_t, counterparts_init, update_counterparts
+  use world_m, only: world_t, set_up
   implicit none
   private
   public :: test_contact_load
 
   real(wp), parameter :: g = 9.81_wp, size(2) = [0.02_wp, 0.3_wp]
-  type(shape_t) :: shapes(2)
 
 contains
 
   subroutine test_contact_load()
-    call make_cubes()
     call check_depth()
     call check_heaviest()
   end subroutine test_contact_load
-
-  subroutine make_cubes()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(2))
-    case%shape%name = [character(5) :: 'small', 'large']
-    case%shape%kind = 'cube'
-    do s = 1, 2
-      case%shape(s)%size = size(s)
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-    call check('a cube hardens at a twelfth of its edge', hard_depth(shapes(1)), size(1)/12, &
-      1.0e-15_wp)
-  end subroutine make_cubes
 
   !> The depth at which the spring holds a force, shallow, hardened, and with a power law.
   subroutine check_depth()
@@ -70,32 +49,28 @@ contains
   !> What the counterparts of a case carry: the heaviest body that moves freely; and each may give
   !! way by a hundredth of its edge.
   subroutine check_heaviest()
-    type(case_t) :: case
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
+    type(world_t) :: world
     type(counterparts_t) :: counterparts
     type(load_t) :: load
-    integer :: b
 
-    allocate (case%body(3), case%drop(0))
-    do b = 1, 3
-      case%body(b)%shape = merge('large', 'small', b == 2)
-      case%body(b)%position = 0.5_wp*b
-    end do
-    call blocks_init(case, shapes, blocks)
-    call counterparts_init(blocks, counterparts)
-    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
-    load = load_of(blocks%mass(2), g)
-    call check('the heaviest', counterparts%load%mass, blocks%mass(2), 0.0_wp)
-    call check('its weight', counterparts%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*2/ &shape name="small" ' &
+      //'kind="cube" size=.02/ &shape name="large" kind="cube" size=.3/ &body shape="small" ' &
+      //'position=3*.5/ &body shape="large" position=3*1/ &body shape="small" position=3*1.5/', &
+        world)
+    call check('a cube hardens at a twelfth of its edge', hard_depth(world%shapes(1)), size(1)/12, &
+      1.0e-15_wp)
+    call counterparts_init(world%blocks, counterparts)
+    call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
+    load = load_of(world%blocks%mass(2), g)
+    call check('the heaviest', counterparts%load%mass, world%blocks%mass(2), 0.0_wp)
+    call check('its weight', counterparts%load%weight, world%blocks%mass(2)*g, &
+      1.0e-12_wp*load%weight)
     call check('may give way', counterparts%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
-    case%body(2)%fixed = .true.
-    call blocks_init(case, shapes, blocks)
-    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
-    call check('nobody carries a held one', counterparts%load%mass, blocks%mass(1), 0.0_wp)
-    case%body%fixed = .true.
-    call blocks_init(case, shapes, blocks)
-    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
+    world%blocks%fixed(2) = .true.
+    call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
+    call check('nobody carries a held one', counterparts%load%mass, world%blocks%mass(1), 0.0_wp)
+    world%blocks%fixed = .true.
+    call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
     call check('all held: no load', counterparts%load%mass, 0.0_wp, 0.0_wp)
   end subroutine check_heaviest
 

@@ -2,13 +2,10 @@
 module test_deep_overlaps_m
   use kinds_m, only: wp
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, store_overlap, store_points, &
-    warn_of_overlaps, overlap_fault, size_of_pair, ask_for_all, ask_for_deep
+  use deep_overlaps_m, only: deep_overlaps_t, store_overlap, store_points, warn_of_overlaps, &
+    overlap_fault, size_of_pair, ask_for_all, ask_for_deep
+  use world_m, only: world_t, set_up
   implicit none
   private
   public :: test_deep_overlaps
@@ -17,13 +14,17 @@ module test_deep_overlaps_m
   integer, parameter :: floor = -5
   type(deep_overlaps_t) :: deep
   type(contact_points_t) :: points
-  type(blocks_t) :: blocks
+  type(world_t) :: world
   integer :: warnings
 
 contains
 
   subroutine test_deep_overlaps()
-    call make_cubes()
+    ! small, large, small
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*4/ &shape name="small" ' &
+      //'kind="cube" size=.02/ &shape name="large" kind="cube" size=.3/ &body shape="small" ' &
+      //'position=3*1/ &body shape="large" position=3*2/ &body shape="small" position=3*3/', world)
+    deep = world%deep
     call check('the smaller counts', size_of_pair(2, 1, deep), size(1), 0.0_wp)
     call check('a wall has no size', size_of_pair(2, floor, deep), size(2), 0.0_wp)
     call store_overlap(2, 1, 0.0009_wp, deep)
@@ -56,40 +57,18 @@ contains
     call check('all', all(deep%asked))
     points%n = 0
     call add_point(contact_point_t(2, 1, 1, depth=0.00049_wp), points)
-    call ask_for_deep(points, blocks, deep)
+    call ask_for_deep(points, world%blocks, deep)
     call check('2.45 % is not deep', .not. any(deep%asked))
     call add_point(contact_point_t(2, 1, 2, depth=0.00051_wp), points)
-    call ask_for_deep(points, blocks, deep)
+    call ask_for_deep(points, world%blocks, deep)
     call check('2.55 % is', all(deep%asked .eqv. [.true., .true., .false.]))
-    blocks%still(:2) = .true.
+    world%blocks%still(:2) = .true.
     call add_point(contact_point_t(3, floor, 1, depth=0.00051_wp), points)
-    call ask_for_deep(points, blocks, deep)
+    call ask_for_deep(points, world%blocks, deep)
     call check('but not of two still ones', all(deep%asked .eqv. [.false., .false., .true.]))
-    blocks%still(2) = .false.
-    call ask_for_deep(points, blocks, deep)
+    world%blocks%still(2) = .false.
+    call ask_for_deep(points, world%blocks, deep)
     call check('of one still one', all(deep%asked))
   end subroutine check_asked
-
-  !> Three cubes, small, large, small.
-  subroutine make_cubes()
-    character(:), allocatable :: message
-    type(shape_t) :: shapes(2)
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(2), case%body(3), case%drop(0))
-    case%shape%name = [character(5) :: 'small', 'large']
-    case%shape%kind = 'cube'
-    do s = 1, 2
-      case%shape(s)%size = size(s)
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-    case%body%shape = [character(5) :: 'small', 'large', 'small']
-    do s = 1, 3
-      case%body(s)%position = real(s, wp)
-    end do
-    call blocks_init(case, shapes, blocks)
-    call deep_overlaps_init(blocks, deep)
-  end subroutine make_cubes
 
 end module test_deep_overlaps_m

@@ -2,23 +2,21 @@
 module test_rigid_body_m
   use kinds_m, only: wp
   use check_m, only: check
-  use case_types_m, only: case_t, body_input_t
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use vectors_m, only: quaternion_exp, rotation_matrix
   use rigid_body_m, only: blocks_t, blocks_init, release_body, begin_step, drift, kick, &
     set_velocity_after_fluid, space_tensor, kinetic_energy, potential_energy
+  use world_m, only: world_t, set_up
   implicit none
   private
   public :: test_rigid_body
 
   real(wp), parameter :: no_gravity(3) = 0.0_wp
-  type(shape_t), allocatable :: shapes(:)
+  character(*), parameter :: brick = '&body shape="brick" position=.1,.2,.3 '
 
 contains
 
   subroutine test_rigid_body()
-    call make_shapes()
     call check_start()
     call check_free_top()
     call check_t_endop()
@@ -27,51 +25,24 @@ contains
     call check_after_fluid()
   end subroutine test_rigid_body
 
-  !> A box with three different moments of inertia, and a sphere.
-  subroutine make_shapes()
-    character(:), allocatable :: message
-    type(case_t) :: case
+  !> Bricks with three different moments of inertia, and balls.
+  subroutine start(bodies, world)
+    character(*), intent(in) :: bodies
+    type(world_t), intent(out) :: world
 
-    allocate (case%shape(2), shapes(2))
-    case%shape%name = [character(8) :: 'brick', 'ball']
-    case%shape%kind = [character(8) :: 'box', 'sphere']
-    case%shape%refinement = 1
-    case%shape(1)%size = [0.01_wp, 0.02_wp, 0.03_wp]
-    case%shape(2)%size = 0.02_wp
-    call make_shape(case%shape(1), shapes(1), message)
-    call make_shape(case%shape(2), shapes(2), message)
-  end subroutine make_shapes
-
-  !> A case of one brick.
-  subroutine one_brick(case)
-    type(case_t), intent(out) :: case
-
-    allocate (case%body(1), case%drop(0))
-    case%body(1)%shape = 'brick'
-    case%body(1)%position = [0.1_wp, 0.2_wp, 0.3_wp]
-  end subroutine one_brick
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="brick" ' &
+      //'kind="box" size=.01,.02,.03/ &shape name="ball" kind="sphere" size=.02/ '//bodies, world)
+  end subroutine start
 
   !> Order, masses, poses and presence of the bodies of a case.
   subroutine check_start()
-    type(case_t) :: case
-    type(blocks_t) :: blocks
+    type(world_t), target :: world
+    type(blocks_t), pointer :: blocks
 
-    allocate (case%body(2), case%drop(1))
-    case%body(1)%shape = 'ball'
-    case%body(1)%position = 0.1_wp
-    case%body(1)%quaternion = [-2.0_wp, 0.0_wp, 0.0_wp, 2.0_wp]
-    case%body(1)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
-    case%body(2)%shape = 'brick'
-    case%body(2)%position = 0.2_wp
-    case%body(2)%release_time = 0.5_wp
-    case%body(2)%velocity = [0.0_wp, 2.0_wp, 0.0_wp]
-    case%body(2)%angular_velocity = [3.0_wp, 0.0_wp, 0.0_wp]
-    case%drop(1)%shape = 'brick'
-    case%drop(1)%position = 0.3_wp
-    case%drop(1)%count = 3
-    case%drop(1)%first_time = 1.0_wp
-    case%drop(1)%interval = 0.25_wp
-    call blocks_init(case, shapes, blocks)
+    call start('&body shape="ball" position=3*.1 quaternion=-2,0,0,2 velocity=1,0,0/ &body ' &
+      //'shape="brick" position=3*.2 release_time=.5 velocity=0,2,0 angular_velocity=3,0,0/ ' &
+      //'&drop shape="brick" position=3*.3 count=3 first_time=1 interval=.25/', world)
+    blocks => world%blocks
     call check('five bodies', blocks%n, 5)
     call check('their shapes', all(blocks%shape == [2, 1, 1, 1, 1]))
     call check('only the first is there', &
@@ -89,21 +60,22 @@ contains
     call release_body(0.6_wp, 2, blocks)
     call check('true time of release', blocks%release_time(2), 0.6_wp, 0.0_wp)
     call check('velocity at release', blocks%v(2, 2), 2.0_wp, 0.0_wp)
-    call check('momentum at release', blocks%l(1, 2), 3.0_wp*shapes(1)%inertia(1, 1), 1.0e-18_wp)
+    call check('momentum at release', blocks%l(1, 2), 3.0_wp*world%shapes(1)%inertia(1, 1), &
+      1.0e-18_wp)
     call check('potential energy', potential_energy([0.0_wp, 0.0_wp, -10.0_wp], blocks), &
       10.0_wp*sum(blocks%mass*blocks%x(3, :)), 1.0e-15_wp)
   end subroutine check_start
 
   !> A torque-free top keeps its angular momentum exactly and its energy to second order.
   subroutine check_free_top()
-    type(case_t) :: case
-    type(blocks_t) :: blocks
+    type(world_t), target :: world
+    type(blocks_t), pointer :: blocks
     real(wp) :: l(3), energy, worst, time_step
     integer :: n
 
-    call one_brick(case)
-    case%body(1)%angular_velocity = [1.0_wp, 10.0_wp, 0.5_wp]   ! near the unstable middle axis
-    call blocks_init(case, shapes, blocks)
+    ! near the unstable middle axis
+    call start(brick//'angular_velocity=1,10,.5/', world)
+    blocks => world%blocks
     l = blocks%l(:, 1)
     energy = kinetic_energy(blocks)
     worst = 0.0_wp
@@ -118,7 +90,7 @@ contains
     call check('energy of the top', worst, 0.0_wp, 1.0e-4_wp)
     call check('quaternion stays one', norm2(blocks%q(:, 1)), 1.0_wp, 1.0e-15_wp)
     call check('omega belongs to l', maxval(abs(blocks%l(:, 1) - &
-      matmul(space_tensor(blocks%q(:, 1), shapes(1)%inertia), blocks%omega(:, 1)))), 0.0_wp, &
+      matmul(space_tensor(blocks%q(:, 1), world%shapes(1)%inertia), blocks%omega(:, 1)))), 0.0_wp, &
       1.0e-12_wp*norm2(l))
   end subroutine check_free_top
 
@@ -129,19 +101,18 @@ contains
     real(wp), parameter :: q_end(4) = [-0.622800788318_wp, -0.278080199769_wp, 0.328467519813_wp, &
       0.653375595653_wp]
     type(shape_t) :: top(1)
-    type(case_t) :: case
+    type(world_t) :: world
     type(blocks_t) :: blocks
     real(wp) :: error(2)
     integer :: n, m, steps
 
-    top = shapes(1:1)
+    call start(brick//'angular_velocity=1.7,0,1/', world)
+    top = world%shapes(1:1)
     top(1)%inertia = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
       3.0_wp], [3, 3])
-    call one_brick(case)
-    case%body(1)%angular_velocity = [1.7_wp, 0.0_wp, 1.0_wp]
     do m = 1, 2
       steps = 200*m
-      call blocks_init(case, top, blocks)
+      call blocks_init(world%case, top, blocks)
       do n = 1, steps
         call drift(t_end/real(steps, wp), blocks)
       end do
@@ -154,14 +125,13 @@ contains
   !> Half drift, kick, half drift is exact for a constant force.
   subroutine check_free_fall()
     real(wp), parameter :: g(3) = [0.3_wp, 0.0_wp, -9.81_wp]
-    type(case_t) :: case
-    type(blocks_t) :: blocks
+    type(world_t), target :: world
+    type(blocks_t), pointer :: blocks
     real(wp) :: x(3), v(3), t
     integer :: n
 
-    call one_brick(case)
-    case%body(1)%velocity = [0.1_wp, -0.2_wp, 0.3_wp]
-    call blocks_init(case, shapes, blocks)
+    call start(brick//'velocity=.1,-.2,.3/', world)
+    blocks => world%blocks
     x = blocks%x(:, 1)
     v = blocks%v(:, 1)
     blocks%fluid_force(:, 1) = blocks%mass(1)*[0.0_wp, 1.0_wp, 0.0_wp]
@@ -177,16 +147,13 @@ contains
 
   !> A fixed body with given rates moves and turns at them whatever acts on it.
   subroutine check_prescribed()
-    type(case_t) :: case
-    type(blocks_t) :: blocks
+    type(world_t), target :: world
+    type(blocks_t), pointer :: blocks
     real(wp), parameter :: omega(3) = [0.0_wp, 0.5_wp, 2.0_wp]
     integer :: n
 
-    call one_brick(case)
-    case%body(1)%fixed = .true.
-    case%body(1)%velocity = [0.0_wp, 0.0_wp, 0.4_wp]
-    case%body(1)%angular_velocity = omega
-    call blocks_init(case, shapes, blocks)
+    call start(brick//'fixed=T velocity=0,0,.4 angular_velocity=0,.5,2/', world)
+    blocks => world%blocks
     blocks%contact_force = 1.0e3_wp
     blocks%contact_torque = 1.0e3_wp
     do n = 1, 10
@@ -206,14 +173,12 @@ contains
   !! the step.
   subroutine check_after_fluid()
     real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp], dt = 0.01_wp
-    type(case_t) :: case
-    type(blocks_t) :: blocks
+    type(world_t), target :: world
+    type(blocks_t), pointer :: blocks
     real(wp) :: force(3, 1), torque(3, 1), v(3), l(3)
 
-    call one_brick(case)
-    case%body(1)%velocity = [0.1_wp, -0.2_wp, 0.3_wp]
-    case%body(1)%angular_velocity = [5.0_wp, 2.0_wp, 1.0_wp]
-    call blocks_init(case, shapes, blocks)
+    call start(brick//'velocity=.1,-.2,.3 angular_velocity=5,2,1/', world)
+    blocks => world%blocks
     v = blocks%v(:, 1)
     l = blocks%l(:, 1)
     call begin_step(blocks)

@@ -3,13 +3,11 @@
 module test_push_bodies_m
   use kinds_m, only: wp, pi
   use check_m, only: check
-  use case_types_m, only: case_t
+  use errors_m, only: to_text
   use vectors_m, only: quaternion_from_axis
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
   use coupling_m, only: copy_motion, push_bodies
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_push_bodies
@@ -19,14 +17,12 @@ module test_push_bodies_m
   real(wp), parameter :: j(3) = mass/12*[0.2_wp**2 + 0.3_wp**2, 0.3_wp**2 + 0.1_wp**2, &
     0.1_wp**2 + 0.2_wp**2]                                       !! of the box [kg m2]
   real(wp), parameter :: z(3) = [0.0_wp, 0.0_wp, 1.0_wp]
-  type(blocks_t) :: blocks
   type(rigid_motion_t) :: bodies
 
 contains
 
   subroutine test_push_bodies()
     call make_blocks()
-    call copy_motion(blocks, bodies)
     call check_inertia()
     call check_who_moves()
     call check_push()
@@ -35,32 +31,30 @@ contains
   !> Boxes: one turned by an eighth about z, one held, one asleep, one not there yet, one by a
   !! quarter about x.
   subroutine make_blocks()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    type(shape_t) :: shapes(1)
-    integer :: b
+    type(world_t) :: world
 
-    allocate (case%shape(1), case%body(5), case%drop(0))
-    case%shape%name = 'box'
-    case%shape%kind = 'box'
-    case%shape(1)%size = edge
-    call make_shape(case%shape(1), shapes(1), message)
-    do b = 1, 5
-      case%body(b)%shape = 'box'
-      case%body(b)%position = 0.5_wp*b
-      case%body(b)%velocity = [1, 2, 3]*b
-      case%body(b)%angular_velocity = [4, 5, 6]*b
-    end do
-    case%body(1)%quaternion = quaternion_from_axis(z, 0.25_wp*pi)
-    case%body(2)%fixed = .true.
-    case%body(4)%release_time = 1.0_wp
-    case%body(5)%quaternion = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.5_wp*pi)
-    call blocks_init(case, shapes, blocks)
-    blocks%asleep(3) = .true.
-    blocks%v(:, 4) = 7.0_wp   ! to no effect
-    blocks%omega(:, 4) = 7.0_wp
+    call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*3/ &shape name="box" ' &
+      //'kind="box" size=.1,.2,.3/ '//box(1, quaternion_from_axis(z, 0.25_wp*pi)) &
+      //box(2, more='fixed=T')//box(3)//box(4, more='release_time=1') &
+      //box(5, quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.5_wp*pi)), world)
+    world%blocks%asleep(3) = .true.
+    world%blocks%v(:, 4) = 7.0_wp   ! to no effect
+    world%blocks%omega(:, 4) = 7.0_wp
     call rigid_motion_init(5, bodies)
+    call copy_motion(world%blocks, bodies)
   end subroutine make_blocks
+
+  !> Box b, as fast as its number.
+  function box(b, q, more) result(text)
+    integer, intent(in) :: b
+    real(wp), intent(in), optional :: q(4)
+    character(*), intent(in), optional :: more
+    character(:), allocatable :: text
+
+    text = 'angular_velocity='//to_text([4, 5, 6]*b)
+    if (present(more)) text = text//' '//more
+    text = body('box', spread(0.5_wp*b, 1, 3), real([1, 2, 3]*b, wp), q, text)
+  end function box
 
   !> Half way between x and y both have the mean of the two, with half their difference between
   !! them; a quarter about x swaps y and z. The inverses belong to them.
