@@ -1,6 +1,6 @@
 !> The multigrid cycle: symmetric, positive, quick, and the same bits on any threads and processes.
 !!
-!! Prints a checksum of each solution, which `test_ranks_linear.py` compares between processes.
+!! Prints a checksum of each solution, which `test_bits.py` compares between processes.
 ! ranks: 2 4
 module test_multigrid_m
   use kinds_m, only: wp

@@ -1,4 +1,4 @@
-"""However the domain is cut: the same bits; many blocks take no more messages than few."""
+"""What processes cost: messages that do not grow with the blocks, a share of the memory each."""
 
 import os
 import re
@@ -7,45 +7,12 @@ import sys
 from pathlib import Path
 
 import h5py
-import numpy as np
 import pytest
 
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, changed, run
-from same_bits import differences
+from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, run
 
 SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 pytestmark = pytest.mark.xdist_group("ranks")
-OLD_PREDICTOR = {"momentum": "c_ismac"}
-OLD_COUPLING = {"coupling": "mics"}
-LAYOUTS = [
-    ("coupled", (24, 16, 32), (1, 1, 2), {}),
-    ("coupled", (30, 14, 10), (3, 1, 1), {}),
-    ("coupled", (16, 12, 30), (1, 1, 4), {}),
-    ("coupled", (16, 12, 30), (1, 1, 3), OLD_PREDICTOR),
-    ("coupled", (24, 12, 12), (2, 1, 2), OLD_COUPLING),
-    ("paper", (23, 14, 11), (2, 2, 1), {}),
-    ("coupled", (21, 8, 15), (5, 1, 1), {}),
-    ("coupled", (23, 13, 10), (2, 3, 1), {}),
-    ("stream", (8, 29, 11), (1, 7, 1), {}),
-    ("current", (12, 14, 15), (2, 2, 2), {}),
-]
-
-
-@pytest.mark.parametrize(("name", "cells", "pieces", "numerics"), LAYOUTS)
-def test_layout(
-    name: str,
-    cells: tuple[int, int, int],
-    pieces: tuple[int, int, int],
-    numerics: dict[str, str],
-    tmp_path: Path,
-) -> None:
-    """Pieces of different sizes in one, two and three directions; couplings and predictors."""
-    text = re.sub(r"t_end = [\d.]+", "t_end = 0.03", (CASES / "ranks" / f"{name}.nml").read_text())
-    case = tmp_path / "case.nml"
-    case.write_text(changed(text, {"grid": {"cells": list(cells)}, "numerics": numerics}))
-    run(case, tmp_path / "alone", Machine(SERIAL, threads=1))
-    run(case, tmp_path / "shared", Machine(PARALLEL, ranks=int(np.prod(pieces))))
-    assert differences(tmp_path / "alone", tmp_path / "shared") == []
 
 
 @pytest.mark.parametrize("coupling", ["monolithic", "mics"])
