@@ -193,7 +193,7 @@ class Watch:
 
     async def _scene(self, request: web.Request) -> web.Response:
         if isinstance(self.watched, Ensemble):
-            number = request.query.get("run", "")
+            number = request.query.get("run", "0")  # none is chosen
             if not re.fullmatch("[0-9]{1,9}", number):
                 raise web.HTTPBadRequest(reason=f"there is no run '{number[:20]}'")
             return json_answer(await apart(self.watched.scene, int(number)))
