@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools.piles import places
 from micstools.piles.pile import at_rest
+from micstools.reading import places
 from micstools.reading.reader import Run
 from run_cases import ROOT
 

@@ -24,7 +24,7 @@ from micstools.cases import settings
 from micstools.cases.program import find as find_program
 from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
 from micstools.ensembles.ensemble import Plan
-from micstools.piles import shares
+from micstools.reading import shares
 from micstools.reading.reader import BadRun, Run
 from synthetic import Motion, write_run
 

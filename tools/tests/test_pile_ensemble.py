@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from calls import mics_tools
-from micstools.piles import pile_ensemble, pile_numbers, shares
+from micstools.piles import pile_ensemble, pile_numbers
+from micstools.reading import shares
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion, write_run

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from calls import mics_tools
-from micstools.piles import handover, places
-from micstools.piles.places import Survey
+from micstools.piles import handover
+from micstools.reading import places
+from micstools.reading.places import Survey
 from micstools.reading.reader import Run
 from micstools.shapes import height_maps
 from micstools.shapes import shape as shapes

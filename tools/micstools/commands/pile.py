@@ -15,9 +15,9 @@ from micstools.commands.base import Command
 from micstools.piles import layer, maps, pile, pile_ensemble, pile_form, pile_numbers, placing
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.piles.placing import Area
-from micstools.piles.shares import in_words
 from micstools.reading import block_numbers, units
 from micstools.reading.reader import BadRun
+from micstools.reading.shares import in_words
 from micstools.reading.units import ascii_of
 from micstools.shapes.geometry import Array
 

@@ -11,12 +11,12 @@ from contourpy import contour_generator
 from micstools import command, extras
 from micstools.commands.base import Command
 from micstools.commands.pile import area_of, write_json
-from micstools.piles import handover, layer, pile_ensemble, places
+from micstools.piles import handover, layer, pile_ensemble
 from micstools.piles.handover import Handover
 from micstools.piles.layer import Corners
 from micstools.piles.pile_ensemble import Ensemble
-from micstools.piles.places import Place, Survey
-from micstools.reading import units
+from micstools.reading import places, units
+from micstools.reading.places import Place, Survey
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import ascii_of
 

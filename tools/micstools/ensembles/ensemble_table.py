@@ -9,7 +9,7 @@ from typing import Any
 
 from micstools import files
 from micstools.ensembles.ensemble import OUTCOMES, Member, Plan, State
-from micstools.piles.shares import in_words, wilson
+from micstools.reading.shares import in_words, wilson
 
 Table = Mapping[Member, State]
 

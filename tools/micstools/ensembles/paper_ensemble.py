@@ -16,9 +16,9 @@ import numpy as np
 from micstools.cases import settings
 from micstools.piles import pile_ensemble
 from micstools.piles.pile_ensemble import Pile
-from micstools.piles.shares import in_words
 from micstools.reading.overlap import find_contacts
 from micstools.reading.reader import BadRun, Run
+from micstools.reading.shares import in_words
 from micstools.shapes.geometry import quaternion_from_axis, quaternion_product
 
 UPWARDS = np.array([0.0, 0.0, 1.0])

@@ -24,13 +24,13 @@ from micstools.pages.html import (
 )
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
-from micstools.piles import pile, pile_ensemble, places, placing
+from micstools.piles import pile, pile_ensemble, placing
 from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
-from micstools.piles.shares import in_words
-from micstools.reading import health
+from micstools.reading import health, places
 from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
+from micstools.reading.shares import in_words
 from micstools.reading.units import Unit, Units, figure
 from micstools.shapes.geometry import Array
 

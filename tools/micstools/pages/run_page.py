@@ -22,9 +22,9 @@ from micstools.pages.html import (
 from micstools.pages.parts import north_note, number, player, swatch
 from micstools.pages.run_words import count
 from micstools.pages.views import Sheet, bed_of, block_colours
-from micstools.piles import layer, maps, pile, pile_numbers, places
+from micstools.piles import layer, maps, pile, pile_numbers
 from micstools.piles.pile_numbers import PileNumbers
-from micstools.reading import block_numbers, health, scales, units
+from micstools.reading import block_numbers, health, places, scales, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.health import Check
 from micstools.reading.overlap import Placed, present_bodies

@@ -7,7 +7,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from micstools.pictures import gltf, vtk_data
+from micstools.pictures import gltf
+from micstools.reading import vtk_data
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array, IntArray

@@ -14,12 +14,12 @@ import numpy as np
 from PIL import Image
 
 from micstools import extras
-from micstools.pictures import labels, vtk_data
-from micstools.pictures.vtk_data import shares_at_points, triangles_of, water_surface
+from micstools.pictures import labels
 from micstools.piles import pile
-from micstools.reading import units
+from micstools.reading import units, vtk_data
 from micstools.reading.overlap import Placed, present_bodies
 from micstools.reading.reader import Fields, Run
+from micstools.reading.vtk_data import shares_at_points, triangles_of, water_surface
 from micstools.shapes.geometry import Array, IntArray
 from micstools.shapes.shape import Shape
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from micstools.piles import pile_form, places
+from micstools.piles import pile_form
 from micstools.piles.layer import Maps, parted
-from micstools.piles.places import Landing, Place, Survey, row_of
+from micstools.reading import places
 from micstools.reading.overlap import Placed
+from micstools.reading.places import Landing, Place, Survey, row_of
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array
 

@@ -15,12 +15,12 @@ from micstools.piles.layer import nominal_diameter, parted
 from micstools.piles.maps import ground_map, top_of, usual_step
 from micstools.piles.pile import has_papers_blocks, still_level
 from micstools.piles.pile_numbers import PileNumbers
-from micstools.piles.places import TOLERANCE, Place, Survey, places
 from micstools.piles.placing import Area, Placing, drop_area, placing
-from micstools.piles.shares import wilson
 from micstools.reading import block_numbers, units
 from micstools.reading.block_numbers import BlockNumbers
+from micstools.reading.places import TOLERANCE, Place, Survey, places
 from micstools.reading.reader import BadRun, Run
+from micstools.reading.shares import wilson
 from micstools.reading.units import Units
 from micstools.shapes.geometry import Array
 

@@ -352,7 +352,7 @@ class Run:
         `block 1`, `block 2`, ... for each released block, the `bed` and the surface of the
         `water` where there are any. All are those of the written time of the fields nearest to
         `t`, of the nearest row in a run without; `field_data["time"]` tells which."""
-        from micstools.pictures import vtk_data
+        from micstools.reading import vtk_data
 
         return vtk_data.at(self, t)
 
@@ -375,7 +375,7 @@ class Run:
     def places(self) -> "pd.DataFrame":
         """Where each block lies at the end, a row each; the columns are explained in
         `attrs["meaning"]`."""
-        from micstools.piles import places
+        from micstools.reading import places
 
         return places.frame(self)
 

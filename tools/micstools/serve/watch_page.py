@@ -13,9 +13,9 @@ from micstools.pages import charts, run_page, run_words
 from micstools.pages.charts import Curve
 from micstools.pages.html import Markup, document, facts, markup, section, table, tag
 from micstools.pages.parts import player
-from micstools.piles.shares import in_words
 from micstools.reading import units
 from micstools.reading.reader import Run
+from micstools.reading.shares import in_words
 from micstools.reading.units import figure
 from micstools.serve.living import State, clock
 from micstools.shapes.geometry import Array

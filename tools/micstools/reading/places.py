@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import pandas as pd
 
-from micstools.piles.shares import in_words, wilson
 from micstools.reading import rest
 from micstools.reading.overlap import find_contacts
 from micstools.reading.reader import Run
+from micstools.reading.shares import in_words, wilson
 from micstools.reading.units import Unit
 from micstools.shapes.geometry import Array
 
