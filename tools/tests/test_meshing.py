@@ -148,6 +148,15 @@ def test_a_byte_order_mark_hides_no_point(tmp_path: Path) -> None:
     assert meshing.load(tmp_path / "a.obj").volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["3mf", "ply", "off", "glb", "stl", "dae"])
+@pytest.mark.parametrize("content", [b"", b"PK\3\4 no archive", b"ply\n\0\xff", bytes(200)])
+def test_a_drawing_that_is_none_is_one_line(tmp_path: Path, kind: str, content: bytes) -> None:
+    path = tmp_path / f"a.{kind}"
+    path.write_bytes(content)
+    with pytest.raises(meshing.BadSurface):
+        meshing.load(path)
+
+
 @pytest.mark.parametrize("more", [b"\n", b"\0" * 49])
 def test_bytes_behind_a_binary_stl_are_passed_over(tmp_path: Path, more: bytes) -> None:
     path = save(hexapod_surface(), tmp_path / "a.stl")

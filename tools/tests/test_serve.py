@@ -33,6 +33,7 @@ from hypothesis import strategies as st  # noqa: E402
 
 from browser import Browser  # noqa: E402
 from micstools.cases import settings  # noqa: E402
+from micstools.pages import set_up  # noqa: E402
 from micstools.reading.reader import BadRun, Run  # noqa: E402
 from micstools.serve import living, server, studio, watch  # noqa: E402
 from micstools.serve.draft import Draft, typed  # noqa: E402
@@ -384,6 +385,17 @@ def test_few_rows_are_read_of_a_long_run(tmp_path: Path) -> None:
     assert len(few.time) <= 11 and few.time[-1] == whole.time[-1] and few.time[0] == 0
     assert few.position[-1].tolist() == whole.position[-1].tolist()
     assert few.release_time.tolist() == whole.release_time.tolist()
+
+
+def test_a_check_that_does_not_end_is_refused(tmp_path: Path) -> None:
+    program = tmp_path / "mics"
+    program.write_text("#!/bin/sh\nexec sleep 60\n")
+    program.chmod(0o755)
+    with (
+        pytest.raises(set_up.Refused, match=r"the check takes more than 0.2 s"),
+        set_up.read(program, CASE, 0.2),
+    ):
+        pass
 
 
 def test_a_damaged_run_is_told_on_its_page(tmp_path: Path) -> None:

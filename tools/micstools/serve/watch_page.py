@@ -1,6 +1,7 @@
 """The page of a run, or of an ensemble, while it goes on. The parts that change are made anew at
 each look, as markup, and put in their places by `live.js`."""
 
+import shlex
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -155,7 +156,7 @@ def _way_on(run: Run, found: State) -> Markup | None:
     """How a run that was stopped goes on."""
     if found.running or found.code == 0 or not run.restart_files:
         return None
-    words = f"mics-tools run CASE --restart {run.folder / run.restart_files[-1]}"
+    words = f"mics-tools run CASE --restart {shlex.quote(str(run.folder / run.restart_files[-1]))}"
     return markup(" It goes on with ", tag("code", words), ".")
 
 

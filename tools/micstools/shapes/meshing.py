@@ -78,7 +78,9 @@ def load(path: Path, element: float = 0.0) -> Surface:
         else:
             mesh = trimesh.load_mesh(path)
         return _closed_near_zero(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
-    except (ValueError, NotImplementedError, AttributeError, IndexError) as error:
+    except BadSurface:
+        raise
+    except Exception as error:  # the readers of trimesh raise what Python has
         raise BadSurface(f"{path}: cannot be read as a surface ({error})") from error
 
 
