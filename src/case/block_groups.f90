@@ -438,17 +438,8 @@ contains
       end if
     end if
     if (.not. v%good('quaternion')) q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    q = unit_quaternion(q)
+    ! of length one; what is so already, to round-off, stays, so that reading again changes nothing
+    if (abs(dot_product(q, q) - 1.0_wp) > 4.0_wp*epsilon(1.0_wp)) q = q/norm2(q)
   end subroutine visit_attitude
-
-  !> A quaternion of length one; one that is so already, to round-off, stays as it is, so that
-  !! writing and reading again changes nothing.
-  pure function unit_quaternion(q) result(unit)
-    real(wp), intent(in) :: q(4)
-    real(wp) :: unit(4)
-
-    unit = q
-    if (abs(dot_product(q, q) - 1.0_wp) > 4.0_wp*epsilon(1.0_wp)) unit = q/norm2(q)
-  end function unit_quaternion
 
 end module block_groups_m

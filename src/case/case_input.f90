@@ -17,7 +17,7 @@ module case_input_m
   use block_groups_m, only: visit_contact, visit_bed, visit_start, visit_shape, visit_body, &
     visit_drop
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text, &
-    parse_integer, value_ok
+    parse_integer
   implicit none
   private
   public :: read_case, parameters_text, group_names, is_repeated, list_entries
@@ -224,8 +224,8 @@ contains
   pure function shape_names(list) result(names)
     type(namelist_text_t), intent(in) :: list
     character(name_length), allocatable :: names(:)
-    type(shape_input_t) :: family
-    integer :: i, k
+    type(shape_input_t) :: family, by_default
+    integer :: i, k, info
 
     allocate (names(0))
     do i = 1, list%n
@@ -234,7 +234,11 @@ contains
         kind=first_value(list%group(i), 'kind'))
       names = [character(name_length) :: names, family%name]
       if (family%kind /= 'rock') cycle
-      family%variants = given_variants(list%group(i))
+      if (first_value(list%group(i), 'variants') /= '') then   ! as far as it can be read
+        call parse_integer(trim(first_value(list%group(i), 'variants')), family%variants, info)
+        if (family%variants < 1 .or. family%variants > max_variants) family%variants = &
+          by_default%variants
+      end if
       names = [character(name_length) :: names, &
         [(member_name(family, k), k=1, family%variants)]]
     end do
@@ -252,19 +256,6 @@ contains
     if (j == 0) return
     if (group%assignment(j)%n > 0) text = group%assignment(j)%value(1)%text
   end function first_value
-
-  !> How many stones a family has, as far as the group can be read.
-  pure function given_variants(group) result(n)
-    type(group_text_t), intent(in) :: group
-    integer :: n
-    type(shape_input_t) :: by_default
-    integer :: info
-
-    n = by_default%variants
-    if (first_value(group, 'variants') == '') return
-    call parse_integer(trim(first_value(group, 'variants')), n, info)
-    if (info /= value_ok .or. n < 1 .or. n > max_variants) n = by_default%variants
-  end function given_variants
 
   !> Checks across groups.
   subroutine check_together(list, case, v)
@@ -373,7 +364,7 @@ contains
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: problems
     character(name_length) :: small
-    integer :: i, j
+    integer :: i, j, k
 
     do i = 1, size(case%shape)
       small = lower_case(case%shape(i)%name)
@@ -381,7 +372,8 @@ contains
       do j = 1, size(case%shape)
         if (j == i) cycle
         if (small /= lower_case(case%shape(j)%name) .or. j > i) then
-          if (.not. is_member(small, case%shape(j))) cycle
+          if (.not. any([(lower_case(member_name(case%shape(j), k)) == small, &
+            k=1, members(case%shape(j)))])) cycle   ! nor that of a stone
         end if
         call problems%add_message('&shape name = '//quoted_text(trim(case%shape(i)%name)) &
           //': the &shape on line '//to_text(case%shape(j)%line)//' has this name already', &
@@ -390,16 +382,6 @@ contains
       end do
     end do
   end subroutine check_names
-
-  !> Does a stone of a family have this name, in small letters?
-  pure function is_member(name, family) result(yes)
-    character(name_length), intent(in) :: name
-    type(shape_input_t), intent(in) :: family
-    logical :: yes
-    integer :: k
-
-    yes = any([(lower_case(member_name(family, k)) == name, k=1, members(family))])
-  end function is_member
 
   !> Every parameter of a case after defaults, as the text of a case with the same meaning.
   function parameters_text(case) result(text)

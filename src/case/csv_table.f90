@@ -16,6 +16,7 @@ module csv_table_m
   public :: csv_table_t, read_table
 
   integer, parameter :: max_columns = 64   !! of a table
+  character(*), parameter :: blank = ' '//achar(9)
 
   type :: csv_table_t
     integer :: n_rows = 0
@@ -60,100 +61,69 @@ contains
     separator = ','
     do line = 1, n_lines
       last = at + index(table%text(at:), new_line('a')) - 2
-      if (.not. is_empty(table%text(at:last), separator)) then
-        if (size(table%name) == 0) separator = separator_of(table%text(at:last))
-        call cut_line(table%text(at:last), separator, n, first, final, quoted)
-        if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
-          //': no second " closes the text on this line')
-        first(:n) = first(:n) + at - 1
-        final(:n) = final(:n) + at - 1
-        if (size(table%name) == 0) then
-          call set_names(table, line, n, first, final, problems)
-          if (size(table%name) == 0) return
-          deallocate (table%line, table%first, table%last)
-          allocate (table%line(n_lines), table%first(size(table%name), n_lines), &
-                    table%last(size(table%name), n_lines))
-        else
-          call add_row(table, line, n, first, final, problems)
+      associate (row => table%text(at:last))
+        first(1) = at
+        at = last + 2
+        if (verify(row, blank//separator) == 0 .or. index(adjustl(row), '#') == 1) cycle
+        if (size(table%name) == 0) then   ! the line of names says what parts the cells
+          if (index(row, ',') == 0 .and. index(row, achar(9)) > 0) separator = achar(9)
+          if (index(row, ';') > 0) separator = ';'
         end if
+      end associate
+      call cut_line(table%text, first(1), last, separator, n, first, final, quoted)
+      if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
+        //': no second " closes the text on this line')
+      do while (n > max(1, size(table%name)))   ! a comma at the end of each line
+        if (final(n) >= first(n)) exit
+        n = n - 1
+      end do
+      if (size(table%name) > 0) then
+        call add_row(table, line, n, first, final, problems)
+        cycle
       end if
-      at = last + 2
+      call set_names(table, line, first(:n), final(:n), problems)
+      deallocate (table%line, table%first, table%last)
+      allocate (table%line(n_lines), table%first(n, n_lines), table%last(n, n_lines))
     end do
     if (size(table%name) == 0) call problems%add_message('the file is empty')
   end subroutine read_table
 
-  !> Is there nothing in a line, or a remark?
-  pure function is_empty(line, separator) result(yes)
-    character(*), intent(in) :: line
-    character(1), intent(in) :: separator
-    logical :: yes
-
-    yes = verify(line, ' '//achar(9)//separator) == 0 .or. index(adjustl(line), '#') == 1
-  end function is_empty
-
-  !> What parts the cells, seen from the line of names.
-  pure function separator_of(line) result(separator)
-    character(*), intent(in) :: line
-    character(1) :: separator
-
-    separator = ','
-    if (index(line, ';') > 0) then
-      separator = ';'
-    else if (index(line, ',') == 0 .and. index(line, achar(9)) > 0) then
-      separator = achar(9)
-    end if
-  end function separator_of
-
   !> The cells of a line: first and last character of each, quotes included.
-  pure subroutine cut_line(line, separator, n, first, final, quoted)
-    character(*), intent(in) :: line
+  pure subroutine cut_line(text, begin, last, separator, n, first, final, quoted)
+    character(*), intent(in) :: text
+    integer, value :: begin                      !! of the line, then of a cell
+    integer, intent(in) :: last                  !! character of the line
     character(1), intent(in) :: separator
     integer, intent(out) :: n                    !! cells; what is beyond `max_columns` is cut off
     integer, intent(out) :: first(:), final(:)
     logical, intent(out) :: quoted               !! the last one has no second "
-    character(*), parameter :: blank = ' '//achar(9)
-    integer :: i, begin
+    integer :: i
 
     n = 0
-    begin = 1
     quoted = .false.
-    do i = 1, len(line) + 1
-      if (i <= len(line)) then
-        if (line(i:i) == '"') quoted = .not. quoted
-        if (quoted .or. line(i:i) /= separator) cycle
+    do i = begin, last + 1
+      if (i <= last) then
+        if (text(i:i) == '"') quoted = .not. quoted
+        if (quoted .or. text(i:i) /= separator) cycle
       end if
+      if (n == size(first)) exit
       n = n + 1
-      if (n > size(first)) exit
-      first(n) = begin
-      final(n) = i - 1
-      do while (first(n) <= final(n))
-        if (verify(line(first(n):first(n)), blank) /= 0) exit
-        first(n) = first(n) + 1
-      end do
-      do while (final(n) >= first(n))
-        if (verify(line(final(n):final(n)), blank) /= 0) exit
-        final(n) = final(n) - 1
-      end do
+      first(n) = begin + verify(text(begin:i - 1)//'.', blank) - 1
+      final(n) = begin + verify(text(begin:i - 1), blank, back=.true.) - 1
       begin = i + 1
     end do
-    n = min(n, size(first))
   end subroutine cut_line
 
   !> The names of the columns, in small letters; a unit in brackets after a name is left away.
-  subroutine set_names(table, line, n, first, final, problems)
+  subroutine set_names(table, line, first, final, problems)
     type(csv_table_t), intent(inout) :: table
-    integer, intent(in) :: line, n, first(:), final(:)
+    integer, intent(in) :: line, first(:), final(:)
     type(problems_t), intent(inout) :: problems
     character(:), allocatable :: word
-    character(name_length) :: name(n)
-    integer :: c, used
+    character(name_length) :: name(size(first))
+    integer :: c
 
-    used = n
-    do while (used > 1)   ! a comma at the end of each line
-      if (final(used) >= first(used)) exit
-      used = used - 1
-    end do
-    do c = 1, used
+    do c = 1, size(first)
       word = lower_case(plain(table%text(first(c):final(c))))
       if (scan(word, '[(') > 1) word = word(:scan(word, '[(') - 1)
       name(c) = word
@@ -163,7 +133,7 @@ contains
         //to_text(line)//', column '//to_text(c)//' ('//printable(trim(word)) &
         //'): is there twice')
     end do
-    table%name = name(:used)
+    table%name = name
     table%head = line
   end subroutine set_names
 
@@ -172,17 +142,12 @@ contains
     type(csv_table_t), intent(inout) :: table
     integer, intent(in) :: line, n, first(:), final(:)
     type(problems_t), intent(inout) :: problems
-    integer :: used, width
+    integer :: width
 
     width = size(table%name)
-    used = n
-    do while (used > width)
-      if (final(used) >= first(used)) exit
-      used = used - 1
-    end do
-    if (used /= width) then
-      call problems%add_message('line '//to_text(line)//', column '//to_text(min(used, width) + 1) &
-        //': '//to_text(used)//trim(merge(' cell ', ' cells', used == 1)) &
+    if (n /= width) then
+      call problems%add_message('line '//to_text(line)//', column '//to_text(min(n, width) + 1) &
+        //': '//to_text(n)//trim(merge(' cell ', ' cells', n == 1)) &
         //', but the table has '//to_text(width)//' columns')
       return
     end if

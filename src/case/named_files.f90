@@ -36,11 +36,12 @@ contains
     character(:), allocatable, intent(in) :: folder   !! with its last '/'
     character(*), intent(in) :: file
     character(:), allocatable :: path
+    logical :: beside
 
     path = file
-    if (has_choice(folder, file)) then
-      if (is_there(folder//file)) path = folder//file
-    end if
+    if (.not. has_choice(folder, file)) return
+    inquire (file=folder//file, exist=beside)
+    if (beside) path = folder//file
   end function found_file
 
   !> The same for people: its name, and where it is if not beside the case.
@@ -50,9 +51,8 @@ contains
     character(:), allocatable :: text
 
     text = file
-    if (has_choice(folder, file)) then
-      if (.not. is_there(folder//file)) text = file//' in the working folder, not beside the case'
-    end if
+    if (.not. has_choice(folder, file)) return
+    if (found_file(folder, file) == file) text = file//' in the working folder, not beside the case'
   end function file_text
 
   !> Can a file of this name be in two places?
@@ -64,12 +64,5 @@ contains
     yes = .false.
     if (allocated(folder)) yes = len(folder) > 0 .and. index(file, '/') /= 1
   end function has_choice
-
-  function is_there(path) result(yes)
-    character(*), intent(in) :: path
-    logical :: yes
-
-    inquire (file=path, exist=yes)
-  end function is_there
 
 end module named_files_m

@@ -13,8 +13,7 @@
 !! comment runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
 module namelist_text_m
   use errors_m, only: problems_t, to_text
-  use text_cursor_m, only: cursor_t, start_of, next, at_end, skip_blanks, skip_line, past_blanks, &
-    take_run, take_until, line_feed, letters, name_characters, word_ends
+  use text_file_m, only: plain_lines
   use value_text_m, only: lower_case, printable, quoted_text, parse_integer, value_ok
   implicit none
   private
@@ -52,6 +51,18 @@ module namelist_text_m
     type(group_text_t), allocatable :: group(:)
   end type namelist_text_t
 
+  !> Where the reader stands in the text.
+  type :: cursor_t
+    character(:), allocatable :: text      !! each line ends in a single line feed
+    integer :: at = 1                      !! next character
+    integer :: line = 1
+  end type cursor_t
+
+  character(*), parameter :: line_feed = achar(10), tab = achar(9)
+  character(*), parameter :: blanks = ' '//tab//line_feed
+  character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
+  character(*), parameter :: name_characters = letters//'0123456789_%'
+  character(*), parameter :: word_ends = blanks//',;!=&/"'''
   integer, parameter :: max_values = 1000     !! values of one variable
   integer, parameter :: max_variables = 1000  !! assignments in one group
 
@@ -64,6 +75,7 @@ contains
     type(problems_t), intent(inout) :: problems
     type(cursor_t) :: cursor
     type(group_text_t) :: group
+    type(group_text_t), allocatable :: longer(:)
     character(:), allocatable :: ended
     integer :: length
     logical :: stray_reported   ! text where only a group may stand
@@ -73,11 +85,18 @@ contains
     stray_reported = .false.
     do
       call skip_blanks(cursor)
-      if (at_end(cursor)) exit
+      if (cursor%at > len(cursor%text)) exit
       if (next(cursor) == '&') then
         call read_group(cursor, group, problems)
-        if (len(group%name) > 0) call append_group(list, group)
         stray_reported = .false.
+        if (len(group%name) == 0) cycle
+        if (list%n == size(list%group)) then
+          allocate (longer(2*list%n))
+          longer(:list%n) = list%group
+          call move_alloc(longer, list%group)
+        end if
+        list%n = list%n + 1
+        list%group(list%n) = group
         cycle
       end if
       ended = ''
@@ -86,7 +105,7 @@ contains
       if (.not. stray_reported) call problems%add_message('text outside the groups: ' &
         //printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))//ended, cursor%line)
       stray_reported = .true.
-      call skip_line(cursor)
+      cursor%at = cursor%at + length
     end do
   end subroutine cut_groups
 
@@ -100,7 +119,8 @@ contains
 
     group%line = cursor%line
     cursor%at = cursor%at + 1
-    group%name = printable(lower_case(take_run(cursor, name_characters)))
+    group%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
+      name_characters) - 1)))
     allocate (group%assignment(16))
     if (len(group%name) == 0) then
       call problems%add_message('''&'' without the name of a group', cursor%line)
@@ -143,7 +163,7 @@ contains
     character(:), allocatable :: rest
 
     yes = .true.
-    if (at_end(cursor)) then
+    if (cursor%at > len(cursor%text)) then
       rest = 'the end of the text'
     else if (next(cursor) == '/') then
       cursor%at = cursor%at + 1
@@ -169,20 +189,17 @@ contains
   pure function starts_assignment(cursor) result(yes)
     type(cursor_t), intent(in) :: cursor
     logical :: yes
-    integer :: i, n, closing
+    integer :: i, closing
 
     yes = .false.
+    if (scan(next(cursor), letters//'_') == 0) return
     associate (text => cursor%text)
-      if (verify(text(cursor%at:cursor%at), letters//'_') > 0) return
-      n = len(text)
       i = past_blanks(text, cursor%at + verify(text(cursor%at:), name_characters) - 1)
-      if (i <= n) then
-        if (text(i:i) == '(') then
-          closing = scan(text(i:), ')'//line_feed)
-          if (closing > 0) i = past_blanks(text, i + closing)
-        end if
+      if (text(i:i) == '(') then
+        closing = scan(text(i:), ')'//line_feed)
+        if (closing > 0) i = past_blanks(text, i + closing)
       end if
-      if (i <= n) yes = text(i:i) == '='
+      yes = text(i:i) == '='
     end associate
   end function starts_assignment
 
@@ -196,7 +213,8 @@ contains
 
     call check_last(group, problems)
     new%line = cursor%line
-    new%name = printable(lower_case(take_run(cursor, name_characters)))
+    new%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
+      name_characters) - 1)))
     allocate (new%value(4))
     same = group%find(new%name)
     if (group%n == max_variables .and. .not. group%faulty) then
@@ -226,12 +244,21 @@ contains
     type(group_text_t), intent(inout) :: group
     type(problems_t), intent(inout) :: problems
     type(value_t) :: value
-    integer :: count, digits
+    character(:), allocatable :: number
+    integer :: count, digits, info
 
     count = 1
     digits = verify(cursor%text(cursor%at:), '0123456789') - 1
     if (digits > 0 .and. cursor%text(cursor%at + digits:cursor%at + digits) == '*') then
-      call read_count(cursor, group, digits, count, problems)
+      number = taken(cursor, digits)
+      cursor%at = cursor%at + 1
+      count = 0
+      call parse_integer(number, count, info)
+      if (info /= value_ok .or. count < 1 .or. count > max_values) then
+        call report(cursor, group, 'repeat count '//printable(number)//' must be 1 to ' &
+          //to_text(max_values), problems)
+        count = 1
+      end if
       if (scan(next(cursor), word_ends) > 0 .and. scan(next(cursor), '"''') == 0) then
         call report(cursor, group, 'a repeat count without its value', problems)
         return
@@ -249,7 +276,7 @@ contains
       cursor%at = cursor%at + 1
       return
     case default
-      value%text = take_until(cursor, word_ends)
+      value%text = taken(cursor, scan(cursor%text(cursor%at:), word_ends) - 1)
       call take_path(cursor, value%text)
     end select
     if (.not. allocated(value%text)) return
@@ -264,26 +291,6 @@ contains
     call append_value(cursor, group, value, count, problems)
   end subroutine read_value
 
-  !> The repeat count in front of a '*'.
-  subroutine read_count(cursor, group, digits, count, problems)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(inout) :: group
-    integer, intent(in) :: digits
-    integer, intent(out) :: count
-    type(problems_t), intent(inout) :: problems
-    integer :: info
-
-    count = 0
-    call parse_integer(cursor%text(cursor%at:cursor%at + digits - 1), count, info)
-    if (info /= value_ok .or. count < 1 .or. count > max_values) then
-      call report(cursor, group, 'repeat count ' &
-                  //printable(cursor%text(cursor%at:cursor%at + digits - 1)) &
-                  //' must be 1 to '//to_text(max_values), problems)
-      count = 1
-    end if
-    cursor%at = cursor%at + digits + 1
-  end subroutine read_count
-
   !> A quoted string; left unallocated if its line ends first.
   subroutine take_string(cursor, group, value, problems)
     type(cursor_t), intent(inout) :: cursor
@@ -291,46 +298,30 @@ contains
     type(value_t), intent(inout) :: value
     type(problems_t), intent(inout) :: problems
     character(1) :: quote
-    integer :: i
+    integer :: i, first
 
     quote = next(cursor)
     value%quoted = .true.
-    i = cursor%at + 1
+    first = cursor%at
+    i = first
     do
+      i = i + scan(cursor%text(i + 1:), quote//line_feed)
       if (cursor%text(i:i) == line_feed) then
-        call report(cursor, group, 'the string '//printable(cursor%text(cursor%at:i - 1)) &
+        call report(cursor, group, 'the string '//printable(cursor%text(first:i - 1)) &
                     //' is not closed on its line', problems)
         group%faulty = .true.
-        exit
-      else if (cursor%text(i:i) == quote) then
-        i = i + 1
-        if (cursor%text(i:i) /= quote) then
-          value%text = undoubled(cursor%text(cursor%at + 1:i - 2), quote)
-          exit
-        end if
+        if (allocated(value%text)) deallocate (value%text)
+        cursor%at = i
+        return
       end if
-      i = i + 1
+      if (.not. allocated(value%text)) value%text = ''
+      value%text = value%text//cursor%text(cursor%at + 1:i - 1)
+      cursor%at = i + 1
+      if (next(cursor) /= quote) return
+      value%text = value%text//quote   ! doubled
+      i = cursor%at
     end do
-    cursor%at = i
   end subroutine take_string
-
-  !> The inside of a quoted string, each doubled quote once.
-  pure function undoubled(inside, quote) result(text)
-    character(*), intent(in) :: inside
-    character(1), intent(in) :: quote
-    character(:), allocatable :: text
-    integer :: i, n
-
-    allocate (character(len(inside)) :: text)
-    i = 1
-    n = 0
-    do while (i <= len(inside))
-      n = n + 1
-      text(n:n) = inside(i:i)
-      i = i + merge(2, 1, inside(i:i) == quote)
-    end do
-    text = text(:n)
-  end function undoubled
 
   !> An unquoted path: a '/' between characters of a word that is no number belongs to the word, so
   !! that one missing pair of quotes is one problem and does not end the group.
@@ -409,21 +400,6 @@ contains
     end associate
   end subroutine report
 
-  !> Add a group to the list.
-  subroutine append_group(list, group)
-    type(namelist_text_t), intent(inout) :: list
-    type(group_text_t), intent(in) :: group
-    type(group_text_t), allocatable :: longer(:)
-
-    if (list%n == size(list%group)) then
-      allocate (longer(2*list%n))
-      longer(:list%n) = list%group
-      call move_alloc(longer, list%group)
-    end if
-    list%n = list%n + 1
-    list%group(list%n) = group
-  end subroutine append_group
-
   !> Add an assignment to the group.
   subroutine append_assignment(group, new)
     type(group_text_t), intent(inout) :: group
@@ -473,5 +449,71 @@ contains
     end do
     text = printable(text)
   end function assignment_shown
+
+  !> The start of a text, with blanks that do not break as blanks, but in strings.
+  pure function start_of(text) result(cursor)
+    character(*), intent(in) :: text
+    type(cursor_t) :: cursor
+    character(*), parameter :: no_break_space = char(194)//char(160)
+    character(1) :: quote   ! that has begun a string on this line, or blank
+    integer :: i
+
+    cursor%text = plain_lines(text)
+    quote = ' '
+    do i = 1, len(cursor%text) - 1
+      associate (c => cursor%text(i:i))
+        if (c == line_feed .or. c == quote) then
+          quote = ' '
+        else if (quote == ' ' .and. scan(c, '"''') == 1) then
+          quote = c
+        end if
+      end associate
+      if (quote == ' ' .and. cursor%text(i:i + 1) == no_break_space) cursor%text(i:i + 1) = '  '
+    end do
+  end function start_of
+
+  !> The next character; only to be asked before the end.
+  pure function next(cursor) result(c)
+    type(cursor_t), intent(in) :: cursor
+    character(1) :: c
+
+    c = cursor%text(cursor%at:cursor%at)
+  end function next
+
+  !> Take so many characters.
+  function taken(cursor, length) result(word)
+    type(cursor_t), intent(inout) :: cursor
+    integer, intent(in) :: length
+    character(:), allocatable :: word
+
+    word = cursor%text(cursor%at:cursor%at + length - 1)
+    cursor%at = cursor%at + length
+  end function taken
+
+  !> Go on past blanks, line ends and comments.
+  pure subroutine skip_blanks(cursor)
+    type(cursor_t), intent(inout) :: cursor
+
+    do while (cursor%at <= len(cursor%text))
+      if (next(cursor) == '!') then
+        cursor%at = cursor%at + index(cursor%text(cursor%at:), line_feed) - 1
+      else if (scan(next(cursor), blanks) == 0) then
+        exit
+      end if
+      if (next(cursor) == line_feed) cursor%line = cursor%line + 1
+      cursor%at = cursor%at + 1
+    end do
+  end subroutine skip_blanks
+
+  !> First place at or after i that is no blank and no line end; at the end of the text its last.
+  pure function past_blanks(text, i) result(j)
+    character(*), intent(in) :: text
+    integer, intent(in) :: i
+    integer :: j
+
+    j = min(i, len(text))
+    j = j - 1 + verify(text(j:), blanks)
+    if (j < i) j = len(text)
+  end function past_blanks
 
 end module namelist_text_m

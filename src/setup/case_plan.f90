@@ -2,7 +2,7 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, contact_input_t, shape_input_t, place_t, is_given, &
+  use case_types_m, only: case_t, contact_input_t, place_t, is_given, &
     smallest_spacing, has_flow, contact_of, not_resolved
   use drops_m, only: place_of_block, shape_of_place
   use boundary_kinds_m, only: side_code, gives_pressure
@@ -185,6 +185,7 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     integer, intent(in) :: n_points(:)   !! points or spheres of each
     character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
+    type(added_inertia_t) :: added
     character(:), allocatable :: submerged
     real(wp) :: mass, g, smallest
     integer :: s
@@ -214,27 +215,20 @@ contains
         right(brief(mass*g), 12), right(submerged, 13)
     end do
     do s = 1, size(shapes)
-      if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s), shapes(s))
+      if (shapes(s)%kind == 'file') call entry(unit, trim(shapes(s)%name)//' from', &
+        file_text(case%shape(s)%folder, case%shape(s)%file)//', ' &
+        //triple(maxval(shapes(s)%point, 2) - minval(shapes(s)%point, 2))//' m, ' &
+        //to_text(size(shapes(s)%facet) - 1)//' facets')   ! its length shows a wrong unit
       if (case%shape(s)%member == 1) call print_family(unit, pack(shapes, shapes%family &
         == shapes(s)%family))
       if (case%run%physics == 'light' .and. extreme_of_family(shapes, s)) then
-        call print_added_mass(unit, case%shape(s), shapes(s))
+        added = added_inertia_of(shapes(s))
+        call entry(unit, trim(shapes(s)%name)//' in water', 'added mass '//brief(added%mass, 3) &
+          //' and inertia '//brief(added%inertia, 2)//' of the displaced, drag coefficient ' &
+          //brief(case%shape(s)%drag_coefficient)//' on the facets')
       end if
     end do
   end subroutine print_shapes
-
-  !> What a block carries of a given water, and how much that brakes it.
-  subroutine print_added_mass(unit, input, shape)
-    integer, intent(in) :: unit
-    type(shape_input_t), intent(in) :: input
-    type(shape_t), intent(in) :: shape
-    type(added_inertia_t) :: added
-
-    added = added_inertia_of(shape)
-    call entry(unit, trim(shape%name)//' in water', 'added mass '//brief(added%mass, 3) &
-      //' and inertia '//brief(added%inertia, 2)//' of the displaced, drag coefficient ' &
-      //brief(input%drag_coefficient)//' on the facets')
-  end subroutine print_added_mass
 
   !> The stones of a family; the table has its lightest and its heaviest.
   subroutine print_family(unit, stones)
@@ -256,17 +250,6 @@ contains
       /real(size(mass), wp))//' kg on average; half of the stones up to '//brief(half(1)) &
       //' kg, half of the mass up to '//brief(half(2))//' kg')
   end subroutine print_family
-
-  !> How long a block from a file is, so that a wrong unit shows.
-  subroutine print_file_shape(unit, input, shape)
-    integer, intent(in) :: unit
-    type(shape_input_t), intent(in) :: input
-    type(shape_t), intent(in) :: shape
-
-    call entry(unit, trim(shape%name)//' from', file_text(input%folder, input%file)//', ' &
-               //triple(maxval(shape%point, 2) - minval(shape%point, 2))//' m, ' &
-               //to_text(size(shape%facet) - 1)//' facets')
-  end subroutine print_file_shape
 
   subroutine print_bodies(unit, case, shapes, bed)
     integer, intent(in) :: unit
@@ -343,7 +326,8 @@ contains
       end do
     end do
     do i = 1, size(case%body)
-      if (case%body(i)%release_time > 0.0_wp) rise = rise + volume_of(shapes, case%body(i)%shape)
+      if (case%body(i)%release_time > 0.0_wp) rise = rise + sum(shapes%volume, shapes%name &
+        == case%body(i)%shape)
     end do
     if (rise <= 0.0_wp) return
     rise = rise/(case%grid%length(1)*case%grid%length(2))
@@ -519,7 +503,7 @@ contains
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
     real(wp), parameter :: min_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
-    real(wp), parameter :: series_bytes = 19*8.0_wp   ! nineteen series
+    real(wp), parameter :: series_bytes = 23*8.0_wp   ! so many series
     real(wp), parameter :: body_bytes = 27*8.0_wp     ! pose, motion, forces, contacts
     real(wp), parameter :: cell_bytes = 6*4.0_wp      ! liquid, solid, pressure, velocity
     real(wp) :: frames, rows
@@ -557,15 +541,6 @@ contains
       if (times - aint(times) > 1.0e-9_wp) written = written + 1.0_wp
     end function written
   end subroutine print_files
-
-  !> Volume of the shape of that name [m3].
-  pure function volume_of(shapes, name) result(volume)
-    type(shape_t), intent(in) :: shapes(:)
-    character(*), intent(in) :: name
-    real(wp) :: volume
-
-    volume = sum(shapes%volume, shapes%name == name)
-  end function volume_of
 
   !> What of each shape touches, points of the surface or contact spheres, and the smallest length
   !! d_s of the contact Courant number, eq. (6), of all shapes.
