@@ -264,19 +264,6 @@ def test_lowered_in_water_and_again_after_a_restart(tmp_path: Path) -> None:
             assert np.array_equal(h5["bodies"][name][:], whole), name
 
 
-def test_the_plan_tells_of_table_and_crane(tmp_path: Path) -> None:
-    """--check tells of rows, of what is set down, and of what a crane does."""
-    table = "shape,x,y,z,time,fixed\ncube,0.1,0.1,,0,0\ncube,0.2,0.1,0.1,1,1\n"
-    case = put(tmp_path, table, "if_blocked = 'raise'  ")
-    plan = " ".join(mics(["--check", case], tmp_path).stdout.split())
-    assert "places from plan.csv: 2 rows, 1 on what lies there, 1 fixed" in plan
-    assert "where a place is taken, raised above what lies there" in plan
-    drop = "&drop shape = 'cube'  position = 0.06, 0.06, 0.12  lowering_speed = 0.2  release = "
-    case = crane(tmp_path / "crane", drop + "'height'  release_height = 0.01 /")
-    plan = " ".join(mics(["--check", case], tmp_path / "crane").stdout.split())
-    assert "lowered at 0.2 m/s, let go 0.01 m over what lies below" in plan
-
-
 IDLE = {
     "release = 'touch'": "release = 'touch': needs lowering_speed above 0",
     "release_height = 1": "release_height = 1: has no meaning with release = 'place'",

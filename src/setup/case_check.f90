@@ -80,9 +80,6 @@ contains
     known = with_begun(case)
     where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
     if (.not. case%grid%extent_faulty) call check_water(case, problems)
-    if (.not. (case%grid%extent_faulty .or. case%grid%cells_faulty)) then
-      call check_capillary_step(case, problems)
-    end if
     if (.not. case%grid%extent_faulty) call check_lengths(known, shapes, problems)
     call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
@@ -94,10 +91,11 @@ contains
     end do
   end subroutine check_case
 
-  !> Boxes of liquid must reach into the tank.
+  !> Boxes of liquid must reach into the tank; a fixed step must be stable with surface tension.
   subroutine check_water(case, problems)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: problems
+    real(wp) :: limit
     integer :: i
 
     do i = 1, size(case%water)
@@ -108,20 +106,12 @@ contains
           //to_text(case%water(i)%max)//': lies outside the tank', case%water(i)%line)
       end if
     end do
-  end subroutine check_water
-
-  !> A fixed step must be stable with explicit surface tension.
-  subroutine check_capillary_step(case, problems)
-    type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: problems
-    real(wp) :: limit
-
-    if (.not. has_flow(case%run) .or. case%run%cfl_max > 0.0_wp) return
+    if (case%grid%cells_faulty .or. .not. has_flow(case%run) .or. case%run%cfl_max > 0.0_wp) return
     limit = capillary_step(case%fluid, smallest_spacing(case%grid))
-    if (case%run%dt <= limit) return
-    call problems%add('&run dt', case%run%dt, 'unstable with surface tension, must be at most ' &
-      //brief(limit, 3)//' s here; or cfl_max > 0 lets the step shrink', case%run%line)
-  end subroutine check_capillary_step
+    if (case%run%dt > limit) call problems%add('&run dt', case%run%dt, 'unstable with surface ' &
+      //'tension, must be at most '//brief(limit, 3)//' s here; or cfl_max > 0 lets the step ' &
+      //'shrink', case%run%line)
+  end subroutine check_water
 
   !> No shape in use is longer than half a period.
   subroutine check_lengths(case, shapes, problems)
@@ -129,11 +119,13 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     type(problems_t), intent(inout) :: problems
     real(wp) :: length, shortest   ! line of a shape, period [m]
-    integer :: s, d
+    integer :: s, d, i
 
     shortest = minval(case%grid%length, case%boundary%kind(1, :) == 'periodic')
     do s = 1, size(shapes)
-      if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s))) cycle
+      if (shapes(s)%volume <= 0.0_wp) cycle
+      if (.not. any(is_called(shapes(s), case%body%shape)) .and. all([(count_of_shape( &
+        case%drop(i), shapes(s), with_fixed=.true.), i=1, size(case%drop))] == 0)) cycle
       if (2*shapes(s)%radius <= 0.5_wp*shortest) cycle   ! no need to look closer
       length = longest_line(shapes(s))
       do d = 1, 3
@@ -146,17 +138,6 @@ contains
       end do
     end do
   end subroutine check_lengths
-
-  !> Does a body or a drop have this shape?
-  pure function in_use(case, shape) result(yes)
-    type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shape
-    logical :: yes
-    integer :: i
-
-    yes = any(is_called(shape, case%body%shape)) .or. any([(count_of_shape(case%drop(i), shape, &
-      with_fixed=.true.), i=1, size(case%drop))] > 0)
-  end function in_use
 
   !> Largest distance between two points of a shape, which are corners of its facets [m].
   pure function longest_line(shape) result(length)
@@ -229,7 +210,11 @@ contains
       call add_neighbours(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
       do p = 1, pairs%n
         a = pairs%b(p)
-        if (n == max_counted .or. .not. together(scene, a, b)) cycle
+        associate (time => scene%blocks%release_time)   ! the first may have moved away
+          if (n == max_counted .or. .not. ((time(a) <= 0.0_wp .and. time(b) <= 0.0_wp) &
+            .or. (scene%held(a) .and. time(a) <= time(b)) &
+            .or. (scene%held(b) .and. time(b) <= time(a)))) cycle
+        end associate
         depth = pair_depth(scene, a, b)
         if (depth <= 0.0_wp) cycle
         n = n + 1
@@ -246,18 +231,6 @@ contains
       call problems%add_message('&body: '//more)
     end if
   end subroutine check_pairs
-
-  !> Must bodies a and b lie apart where they start?
-  pure function together(scene, a, b) result(yes)
-    type(scene_t), intent(in) :: scene
-    integer, intent(in) :: a, b
-    logical :: yes
-
-    associate (time => scene%blocks%release_time)
-      yes = (time(a) <= 0.0_wp .and. time(b) <= 0.0_wp) &
-        .or. (scene%held(a) .and. time(a) <= time(b)) .or. (scene%held(b) .and. time(b) <= time(a))
-    end associate
-  end function together
 
   !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose
   !! place lies in a wall or a held body could wait for ever, so it is a problem now. One that is
@@ -277,7 +250,9 @@ contains
     first = ''
     associate (drop => case%drop(i))
       do k = 1, drop%count
-        if (begins_elsewhere(case, i, k)) cycle
+        if (case%begun%n > 0) then   ! where another run left it
+          if (any(case%begun%drop == i .and. case%begun%block == k)) cycle
+        end if
         place = place_of_block(drop, k)
         scene%blocks%shape(b) = shape_of_place(place, scene%blocks%shapes)
         if (scene%blocks%shape(b) == 0) cycle
@@ -331,16 +306,6 @@ contains
       end if
     end associate
   end function highest_place
-
-  !> Does a block of a drop begin where another run left it?
-  pure function begins_elsewhere(case, drop, block) result(yes)
-    type(case_t), intent(in) :: case
-    integer, intent(in) :: drop, block
-    logical :: yes
-
-    yes = case%begun%n > 0
-    if (yes) yes = any(case%begun%drop == drop .and. case%begun%block == block)
-  end function begins_elsewhere
 
   !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
   function hindrance(case, scene, b) result(text)

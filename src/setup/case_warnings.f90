@@ -2,7 +2,7 @@
 module case_warnings_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, drop_input_t, place_t, is_given, &
+  use case_types_m, only: case_t, shape_input_t, place_t, is_given, &
     smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
@@ -37,16 +37,20 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(problems_t), intent(inout) :: warnings
+    integer(i8) :: planned, available   ! [B]
     integer :: s
 
     if (case%fluid%gravity(3) > 0.0_wp) call warnings%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
     if (case%run%physics /= 'dry') call look_at_water(case, warnings)
     if (has_flow(case%run)) then
-      call look_at_inflows(case, warnings)
-      call look_at_open_sides(case, warnings)
+      call look_at_sides(case, warnings)
     end if
-    call look_at_memory(case, shapes, warnings)
+    planned = planned_memory(case, shapes)
+    available = available_memory()
+    if (available > 0 .and. planned > available) call warnings%add_message('&grid cells = ' &
+      //to_text(case%grid%cells)//': the run takes about '//size_text(real(planned, wp)) &
+      //' of memory, more than the '//size_text(real(available, wp))//' that this machine has left')
     call look_at_contact(case, warnings)
     call look_at_seeds(case, warnings)
     call look_at_rest(case, shapes, warnings)
@@ -85,41 +89,31 @@ contains
       trim(case%run%physics), 'without any water; give &fluid water_level or &water', case%run%line)
   end subroutine look_at_water
 
-  !> Inflows without a level, through which gas alone comes in.
-  subroutine look_at_inflows(case, warnings)
-    type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: warnings
-    integer :: s, d
-
-    if (case%fluid%single_phase .or. is_given(case%fluid%water_level)) return
-    do d = 1, 3
-      do s = 1, 2
-        if (case%boundary%kind(s, d) == 'inflow') call warnings%add_message('&boundary ' &
-          //side_name(s, d)//' = ''inflow'': only gas comes in without &fluid water_level')
-      end do
-    end do
-  end subroutine look_at_inflows
-
-  !> Without a surface an open side has pressure 0 from top to bottom, which still water has not.
-  subroutine look_at_open_sides(case, warnings)
+  !> Inflows without a level, through which gas alone comes in; and open sides without a surface,
+  !! whose pressure is 0 from top to bottom, which that of still water is not.
+  subroutine look_at_sides(case, warnings)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: warnings
     real(wp) :: along(3)
     integer :: s, d
 
-    if (.not. case%fluid%single_phase) return
     do d = 1, 3
       along = case%fluid%gravity
       along(d) = 0.0_wp
-      if (.not. any(abs(along) > 0.0_wp)) cycle
       do s = 1, 2
-        if (case%boundary%kind(s, d) == 'open') call warnings%add_message('&boundary ' &
-          //side_name(s, d)//' = ''open'': gravity acts along it and the pressure on it is 0 ' &
-          //'from top to bottom, so with single_phase the liquid flows from rest; it ' &
-          //'stays at rest beside an ''outflow''')
+        if (case%boundary%kind(s, d) == 'inflow' .and. .not. (case%fluid%single_phase &
+            .or. is_given(case%fluid%water_level))) then
+          call warnings%add_message('&boundary '//side_name(s, d) &
+            //' = ''inflow'': only gas comes in without &fluid water_level')
+        else if (case%boundary%kind(s, d) == 'open' .and. case%fluid%single_phase &
+            .and. any(abs(along) > 0.0_wp)) then
+          call warnings%add_message('&boundary '//side_name(s, d)//' = ''open'': gravity acts ' &
+            //'along it and the pressure on it is 0 from top to bottom, so with single_phase the ' &
+            //'liquid flows from rest; it stays at rest beside an ''outflow''')
+        end if
       end do
     end do
-  end subroutine look_at_open_sides
+  end subroutine look_at_sides
 
   !> Parts of the contact that this case does not have.
   subroutine look_at_contact(case, warnings)
@@ -138,20 +132,6 @@ contains
         //'&contact model = ''surface'', they only come into run.h5', case%shape(s)%line)
     end do
   end subroutine look_at_contact
-
-  !> More memory than there is.
-  subroutine look_at_memory(case, shapes, warnings)
-    type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
-    type(problems_t), intent(inout) :: warnings
-    integer(i8) :: planned, available
-
-    planned = planned_memory(case, shapes)
-    available = available_memory()
-    if (available > 0 .and. planned > available) call warnings%add_message('&grid cells = ' &
-      //to_text(case%grid%cells)//': the run takes about '//size_text(real(planned, wp)) &
-      //' of memory, more than the '//size_text(real(available, wp))//' that this machine has left')
-  end subroutine look_at_memory
 
   !> Blocks that are due only after the end of the run.
   subroutine look_at_times(case, warnings)
@@ -224,11 +204,11 @@ contains
     logical :: random(size(case%drop))
     integer :: i
 
-    random = is_random(case%drop)
     do i = 1, size(case%drop)
-      random(i) = random(i) .or. any(case%shape%member > 0 &
-        .and. case%shape%name == case%drop(i)%shape)
       associate (drop => case%drop(i))
+        random(i) = any(abs(drop%spread) > 0.0_wp) .or. drop%orientation == 'random' &
+          .or. drop%tilt_deg > 0.0_wp .or. drop%shapes(1) /= '' &
+          .or. any(case%shape%member > 0 .and. case%shape%name == drop%shape)
         if (.not. random(i)) cycle
         if (.not. any(case%drop(:i - 1)%seed == drop%seed .and. random(:i - 1))) cycle
         call warnings%add('&drop seed', drop%seed, 'is that of another &drop too: their blocks ' &
@@ -236,15 +216,6 @@ contains
       end associate
     end do
   end subroutine look_at_seeds
-
-  !> Is anything of a drop left to chance?
-  elemental function is_random(drop) result(yes)
-    type(drop_input_t), intent(in) :: drop
-    logical :: yes
-
-    yes = any(abs(drop%spread) > 0.0_wp) .or. drop%orientation == 'random' &
-          .or. drop%tilt_deg > 0.0_wp .or. drop%shapes(1) /= ''
-  end function is_random
 
   !> A block too light, too large, too coarse in the grid or in its own tetrahedra.
   subroutine look_at_shape(case, input, shape, warnings)

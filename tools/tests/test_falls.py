@@ -108,9 +108,11 @@ def test_falls_are_predicted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     said = told(f"&bed file = 'bed.txt' / {CUBE} 3, 2, 3 /")
     high = "lowest point 1 m above the bed, 0.5 m above the water; water 0.5 m deep there, 5 cells"
     assert high in said
-    Path("plan.csv").write_text("shape,x,y,z,time\ncube,1,1,,1\ncube,2,1,3,2\n")
+    Path("plan.csv").write_text("shape,x,y,z,time,fixed\ncube,1,1,,1,0\ncube,2,1,3,2,1\n")
     said = told("&drop file = 'plan.csv' /")
-    assert "the first of 2: is set on what lies there; places from plan.csv" in said
+    assert (
+        "the first of 2: is set on what lies there; places from plan.csv: 2 rows, 1 fixed" in said
+    )
 
 
 @pytest.mark.skipif(not MICS.exists(), reason="needs the program")

@@ -214,7 +214,7 @@ def falls(run: Run, line: IntArray) -> Lines:
             words = ["is set on what lies there"]  # a row of a table without a height
         if n > 1 and not lowered:
             words[0] = f"the first of {n}: {words[0]}"
-        words += _handled(drop)
+        words += _handled(drop, n, int(b.fixed[first : first + n].sum()))
         said.append((f"&drop on line {line[first]}", words))
         first += n
     if len(drops) > _MOST:
@@ -222,11 +222,11 @@ def falls(run: Run, line: IntArray) -> Lines:
     return said
 
 
-def _handled(drop: dict[str, Any]) -> list[str]:
+def _handled(drop: dict[str, Any], n: int, fixed: int) -> list[str]:
     """What a crane does with the blocks of a drop, and the table that they come from."""
     said = []
     if table := str(drop.get("file", "")).strip():
-        said.append(f"places from {table}")
+        said.append(f"places from {table}: {n} rows, {fixed} fixed")
     if drop["lowering_speed"]:
         until = {
             "touch": "where it touches what lies below",
