@@ -100,15 +100,18 @@ def command(arguments: list[str | Path], patience: float = PATIENCE) -> tuple[bo
     return done.returncode == 0, done.stdout
 
 
-def unit(test: str) -> list[str]:
-    """The command that runs a unit test: its folder's program with its name."""
+def source_of(test: str) -> Path:
+    """The file of a unit test, from the root on."""
     (source,) = (ROOT / "verification" / "unit").glob(f"*/{test}.f90")
-    return [f"build/serial/test_{source.parent.name}", test.removeprefix("test_")]
+    return source.relative_to(ROOT)
 
 
 def build(tests: tuple[str, ...], patience: float = PATIENCE) -> tuple[bool, str]:
-    """Compile what the tests need, with little optimisation to save time."""
-    goals = sorted({unit(test)[0] for test in tests if "/" not in test})
+    """Compile what these tests need, no others, with little optimisation to save time."""
+    units = [source_of(test) for test in tests if "/" not in test]
+    goals = sorted({f"build/serial/test_{unit.parent.name}" for unit in units})
+    if units:
+        goals.append(f"tests={' '.join(map(str, units))}")
     if any("/" in test for test in tests):
         goals.append("mics")
     return command(["make", "OPT=-O1 -march=native", "LTO=", *goals], patience)
@@ -118,7 +121,8 @@ def green(test: str) -> bool:
     """Does the test pass in the scratch tree?"""
     if "/" in test:
         return command([".venv/bin/python", "-m", "pytest", "-x", "-q", test])[0]
-    return command(unit(test))[0]
+    program = f"build/serial/test_{source_of(test).parent.name}"
+    return command([program, test.removeprefix("test_")])[0]
 
 
 def verdict(mutation: Mutation) -> tuple[bool, str]:

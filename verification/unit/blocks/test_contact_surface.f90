@@ -3,36 +3,27 @@
 module test_contact_surface_m
   use kinds_m, only: wp, pi
   use check_m, only: check
-  use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use vectors_m, only: cross, quaternion_from_axis, quaternion_exp, quaternion_product, normalised
   use random_counter_m, only: uniform, random_rotation
-  use rigid_body_m, only: blocks_t, blocks_init, release_body
-  use walls_m, only: walls_t, walls_init
+  use rigid_body_m, only: release_body
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_contact_surface
 
-  !> A small world of its own.
-  type :: world_t
-    type(case_t) :: case
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
+  type, extends(world_t) :: touching_t
     type(contact_surface_t) :: surface
     type(contact_points_t) :: points
-  end type world_t
+  end type touching_t
 
   real(wp), parameter :: d = 0.02_wp         !! edge of the cubes, diameter of the ball [m]
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-  type(shape_t), allocatable :: shapes(:)
 
 contains
 
   subroutine test_contact_surface()
-    call make_shapes()
     call check_rest_heights()
     call check_corner_in_face()
     call check_crossing_edges()
@@ -43,40 +34,26 @@ contains
     call check_lists()
   end subroutine test_contact_surface
 
-  subroutine make_shapes()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(4), shapes(4))
-    case%shape%name = [character(8) :: 'hexapod', 'cube', 'ball', 'fine']
-    case%shape%kind = [character(8) :: 'hexapod', 'cube', 'sphere', 'hexapod']
-    case%shape%refinement = [1, 1, 1, 3]
-    do s = 1, 4
-      case%shape(s)%size = d
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-  end subroutine make_shapes
-
   !> A tank of 1 m with bodies of the given shapes.
   subroutine new_world(world, names)
-    type(world_t), intent(out) :: world
+    type(touching_t), intent(out) :: world
     character(*), intent(in) :: names(:)
+    character(:), allocatable :: text
     integer :: b
 
-    allocate (world%case%body(size(names)), world%case%drop(0))
-    world%case%grid%length = 1.0_wp
+    text = '&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="hexapod" ' &
+      //'kind="hexapod" size=.02 refinement=1/ &shape name="cube" kind="cube" size=.02 ' &
+      //'refinement=1/ &shape name="ball" kind="sphere" size=.02/ &shape name="fine" ' &
+      //'kind="hexapod" size=.02 refinement=3/ '
     do b = 1, size(names)
-      world%case%body(b)%shape = names(b)
-      world%case%body(b)%position = 0.5_wp
+      text = text//body(trim(names(b)), [0.5_wp, 0.5_wp, 0.5_wp])
     end do
-    call blocks_init(world%case, shapes, world%blocks)
-    call walls_init(world%case%grid, world%case%boundary, world%walls)
+    call set_up(text, world%world_t)
     call contact_surface_init(0.1_wp, 1.0e-4_wp, world%blocks, world%surface)
   end subroutine new_world
 
   subroutine find(world)
-    type(world_t), intent(inout) :: world
+    type(touching_t), intent(inout) :: world
 
     call find_surface_points(world%walls, world%blocks, 0.0_wp, world%surface, world%points)
   end subroutine find
@@ -84,7 +61,7 @@ contains
   !> A hexapod on one, two and three legs: the heights 1.5 d, sqrt(2) d, 2.5 d/sqrt(3) and the
   !! corners that stand.
   subroutine check_rest_heights()
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp) :: height(3), q(4, 3)
     integer :: corners(3), pose, shape
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'fine']
@@ -113,7 +90,7 @@ contains
 
   !> The corner of a cube in the face of another, from both sides.
   subroutine check_corner_in_face()
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp) :: depth
     integer :: upper
 
@@ -138,7 +115,7 @@ contains
 
   !> Two cubes on edge, crossed: the edges touch at one point, where no corner is near.
   subroutine check_crossing_edges()
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp), parameter :: depth = 2.0e-4_wp
 
     call new_world(world, ['cube', 'cube'])
@@ -159,7 +136,7 @@ contains
 
   !> Cubes exactly on one another, and two beams crossed flat: carried without tilt.
   subroutine check_faces_on_one_another()
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp), parameter :: depth = 1.0e-5_wp
     real(wp) :: force, torque(3)
     integer :: t, cross_laid
@@ -190,7 +167,7 @@ contains
   !! by its fall or its spin, not if it goes sideways. Without one all that are near may.
   subroutine check_points_to_come()
     real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp) :: v(3, 4), spin(4)
     integer :: m
 
@@ -215,7 +192,7 @@ contains
 
   !> A ball touches a ball, a face, an edge, a corner and a wall at one point each.
   subroutine check_balls()
-    type(world_t) :: world
+    type(touching_t) :: world
     real(wp), parameter :: depth = 1.0e-4_wp
     real(wp) :: way(3)
     integer :: m
@@ -246,7 +223,7 @@ contains
   !> The forces of any pair in contact follow from the energy of its springs: the work of a small
   !! motion, in any direction and about any axis, against the change of energy.
   subroutine check_energy()
-    type(world_t) :: new, world, moved
+    type(touching_t) :: new, world, moved
     real(wp), parameter :: step = 1.0e-8_wp
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'cube']
     real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work
@@ -298,7 +275,7 @@ contains
 
   !> Move body 2 along a direction until the deepest contact has about the depth wanted.
   subroutine bring_together(world, direction, depth, detected)
-    type(world_t), intent(inout) :: world
+    type(touching_t), intent(inout) :: world
     real(wp), intent(in) :: direction(3), depth
     integer, intent(out) :: detected
     real(wp) :: far, near, middle
@@ -323,7 +300,7 @@ contains
 
   !> Force and torque on body 2 from its contact points with body 1, for springs of stiffness one.
   subroutine forces(world, force, torque)
-    type(world_t), intent(in) :: world
+    type(touching_t), intent(in) :: world
     real(wp), intent(out) :: force(3), torque(3)
     real(wp) :: f(3)
     integer :: t
@@ -342,7 +319,7 @@ contains
 
   !> Energy of the springs of all contact points.
   function energy(world)
-    type(world_t), intent(inout) :: world
+    type(touching_t), intent(inout) :: world
     real(wp) :: energy
 
     call find(world)
@@ -352,7 +329,7 @@ contains
 
   !> Shift and turn body 2.
   subroutine move(world, shift, turn)
-    type(world_t), intent(inout) :: world
+    type(touching_t), intent(inout) :: world
     real(wp), intent(in) :: shift(3), turn(3)   !! [m], [rad]
 
     world%blocks%x(:, 2) = world%blocks%x(:, 2) + shift
@@ -363,7 +340,7 @@ contains
   !> What is found does not depend on when the lists were made: a body carried past another, in
   !! strides within which it trembles a little.
   subroutine check_lists()
-    type(world_t), save :: new, world, fresh
+    type(touching_t), save :: new, world, fresh
     integer :: step, tremble, differ, touched
 
     call new_world(new, ['hexapod', 'hexapod'])
@@ -391,7 +368,7 @@ contains
 
   !> Whether what touches is the same in two worlds, bit by bit.
   function same_points(one, two) result(same)
-    type(world_t), intent(in) :: one, two
+    type(touching_t), intent(in) :: one, two
     logical :: same
     integer :: n
 

@@ -4,15 +4,14 @@ module test_overlap_m
   use check_m, only: check
   use case_types_m, only: case_t
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use vectors_m, only: quaternion_from_axis
   use rotations_m, only: rotate
   use random_counter_m, only: uniform, random_rotation
-  use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
+  use world_m, only: world_t, set_up, body
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place
+  use deep_overlaps_m, only: ask_for_all
+  use overlap_m, only: overlap_depth, wall_depth, max_overlap, has_place
   implicit none
   private
   public :: test_overlap
@@ -20,12 +19,18 @@ module test_overlap_m
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
   real(wp), parameter :: origin(3) = 0.0_wp
   real(wp), parameter :: d = 0.02_wp   !! edge of the cube, diameter of the ball [m]
+  character(*), parameter :: tank = '&run t_end=1 physics="dry"/ &shape name="cube" kind="cube" ' &
+    //'size=.02/ &shape name="ball" kind="sphere" size=.02/ &shape name="hexapod" ' &
+    //'kind="hexapod" size=.02/ '
   type(shape_t), allocatable :: shapes(:)
 
 contains
 
   subroutine test_overlap()
-    call make_shapes()
+    type(world_t) :: world
+
+    call set_up(tank//'&grid cells=3*2 length=3*1/', world)
+    shapes = world%shapes
     call check_pairs_of_boxes()
     call check_turned_pairs()
     call check_balls()
@@ -34,20 +39,6 @@ contains
     call check_near_pairs()
     call check_bins()
   end subroutine test_overlap
-
-  subroutine make_shapes()
-    character(:), allocatable :: message
-    type(case_t) :: case
-    integer :: s
-
-    allocate (case%shape(3), shapes(3))
-    case%shape%name = [character(8) :: 'cube', 'ball', 'hexapod']
-    case%shape%kind = [character(8) :: 'cube', 'sphere', 'hexapod']
-    do s = 1, 3
-      case%shape(s)%size = d
-      call make_shape(case%shape(s), shapes(s), message)
-    end do
-  end subroutine make_shapes
 
   !> Cubes pushed into one another along a face normal, corner first, and edge across edge.
   subroutine check_pairs_of_boxes()
@@ -145,71 +136,65 @@ contains
   !! body.
   subroutine check_run()
     integer, parameter :: n = 12
-    type(case_t) :: case
-    type(blocks_t) :: blocks
-    type(walls_t) :: walls
-    type(overlap_t) :: overlap
-    type(deep_overlaps_t) :: deep
+    type(world_t) :: world
+    character(:), allocatable :: text
     real(wp) :: depth, expected, x(3), one, share(n + 1)
     integer :: a, b, deepest, counterpart
 
-    allocate (case%body(n + 1), case%drop(0))
-    case%grid%length = 0.2_wp
-    case%boundary%kind(:, 1) = 'periodic'
+    text = tank//'&grid cells=3*2 length=3*.2/ &boundary x_min="periodic" x_max="periodic"/ '
     do a = 1, n + 1
-      case%body(a)%shape = merge('hexapod', 'cube   ', mod(a, 2) == 0)
-      case%body(a)%position = 0.03_wp &
-        + 0.14_wp*[uniform(2, a, 11), uniform(2, a, 12), uniform(2, a, 13)]
-      case%body(a)%quaternion = random_rotation(2, a)
+      text = text//body(trim(merge('hexapod', 'cube   ', mod(a, 2) == 0)), 0.03_wp &
+        + 0.14_wp*[uniform(2, a, 11), uniform(2, a, 12), uniform(2, a, 13)], &
+        q=random_rotation(2, a), more=trim(merge('release_time=1', '              ', a == n + 1)))
     end do
-    case%body(n + 1)%release_time = 1.0_wp
-    call blocks_init(case, shapes, blocks)
-    call walls_init(case%grid, case%boundary, walls)
-    call overlap_init(shapes, blocks%n, overlap)
-    call deep_overlaps_init(blocks, deep)
-    call ask_for_all(deep)
+    call set_up(text, world)
+    call ask_for_all(world%deep)
     expected = 0.0_wp
     share = 0.0_wp
     do a = 1, n
-      one = wall_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), walls)
+      one = wall_depth(shapes(world%blocks%shape(a)), world%blocks%x(:, a), world%blocks%q(:, a), &
+        world%walls)
       expected = max(expected, one)
-      share(a) = max(share(a), one/deep%size(a))
+      share(a) = max(share(a), one/world%deep%size(a))
       do b = 1, a - 1
-        x = blocks%x(:, b) + nearest_shift(walls%period, blocks%x(:, b) - blocks%x(:, a))
-        one = overlap_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), &
-          shapes(blocks%shape(b)), x, blocks%q(:, b))
+        x = world%blocks%x(:, b) + nearest_shift(world%walls%period, &
+          world%blocks%x(:, b) - world%blocks%x(:, a))
+        one = overlap_depth(shapes(world%blocks%shape(a)), world%blocks%x(:, a), &
+          world%blocks%q(:, a), shapes(world%blocks%shape(b)), x, world%blocks%q(:, b))
         expected = max(expected, one)
-        share([a, b]) = max(share([a, b]), one/min(deep%size(a), deep%size(b)))
+        share([a, b]) = max(share([a, b]), one/min(world%deep%size(a), world%deep%size(b)))
       end do
     end do
-    call max_overlap(walls, blocks, overlap, depth, deep)
+    call max_overlap(world%walls, world%blocks, world%overlap, depth, world%deep)
     call check('some overlap', expected > 1.0e-3_wp)
     call check('largest overlap', depth, expected, 1.0e-15_wp)
-    call check('that of the body with the deepest', maxval(deep%depth), expected, 1.0e-15_wp)
-    counterpart = deep%counterpart(maxloc(share, 1))
+    call check('that of the body with the deepest', maxval(world%deep%depth), expected, 1.0e-15_wp)
+    counterpart = world%deep%counterpart(maxloc(share, 1))
     where (share <= 0.05_wp) share = 0.0_wp
     call check('several reach deep', count(share > 0.0_wp) > 3)
-    call check('all that reach deep are noted', deep%share, share, 1.0e-12_wp)
-    deep%asked = .false.
-    call max_overlap(walls, blocks, overlap, depth, deep)
-    call check('nothing is asked for', depth <= 0.0_wp .and. all(deep%share <= 0.0_wp))
+    call check('all that reach deep are noted', world%deep%share, share, 1.0e-12_wp)
+    world%deep%asked = .false.
+    call max_overlap(world%walls, world%blocks, world%overlap, depth, world%deep)
+    call check('nothing is asked for', depth <= 0.0_wp .and. all(world%deep%share <= 0.0_wp))
     deepest = maxloc(share, 1)
-    deep%asked([deepest, counterpart]) = .true.
-    call max_overlap(walls, blocks, overlap, depth, deep)
-    call check('of two', deep%share(deepest), share(deepest), 1.0e-12_wp)
-    call check('and of no more', count(deep%share > 0.0_wp), 2)
-    blocks%present = .false.
-    blocks%present(1) = .true.
-    blocks%q = spread(upright, 2, n + 1)
-    blocks%x(:, 1) = [0.15_wp, 0.1_wp, 0.1_wp]
-    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.011_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room', .not. has_place(walls, blocks, n + 1, overlap))
-    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
-    call check('room', has_place(walls, blocks, n + 1, overlap))
-    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room beside the image', .not. has_place(walls, blocks, n + 1, overlap))
-    blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
-    call check('no room in the floor', .not. has_place(walls, blocks, n + 1, overlap))
+    world%deep%asked([deepest, counterpart]) = .true.
+    call max_overlap(world%walls, world%blocks, world%overlap, depth, world%deep)
+    call check('of two', world%deep%share(deepest), share(deepest), 1.0e-12_wp)
+    call check('and of no more', count(world%deep%share > 0.0_wp), 2)
+    world%blocks%present = .false.
+    world%blocks%present(1) = .true.
+    world%blocks%q = spread(upright, 2, n + 1)
+    world%blocks%x(:, 1) = [0.15_wp, 0.1_wp, 0.1_wp]
+    world%blocks%x(:, n + 1) = world%blocks%x(:, 1) + [d - 0.011_wp*d, 0.0_wp, 0.0_wp]
+    call check('no room', .not. has_place(world%walls, world%blocks, n + 1, world%overlap))
+    world%blocks%x(:, n + 1) = world%blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
+    call check('room', has_place(world%walls, world%blocks, n + 1, world%overlap))
+    world%blocks%x(:, n + 1) = world%blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
+    call check('no room beside the image', .not. has_place(world%walls, world%blocks, n + 1, &
+      world%overlap))
+    world%blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
+    call check('no room in the floor', .not. has_place(world%walls, world%blocks, n + 1, &
+      world%overlap))
   end subroutine check_run
 
   !> The list of near pairs against all pairs, with and without periods.

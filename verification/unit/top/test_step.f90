@@ -48,8 +48,8 @@ contains
     end if
     if (index(groups, '&grid') == 0) text = text//'/ &grid cells=12,8,12 length=.12,.08,.12'
     if (index(groups, '&numerics') == 0) text = text//'/ &numerics divergence_tolerance=1e-8'
-    if (index(groups, &
-      '&shape') == 0) text = text//'/ &shape name="box" kind="box" size=.04,.03,.035'
+    if (index(groups, '&shape') == 0) text = text &
+      //'/ &shape name="box" kind="box" size=.04,.03,.035'
     call set_up(text//'/ '//groups, sim)
   end subroutine tank
 
