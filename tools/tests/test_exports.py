@@ -38,7 +38,7 @@ def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
     said = capsys.readouterr()
     path = run.folder / "export" / "final.csv"
     assert said.out == f"{path}\n"
-    assert "left out, not released by the end: 6, 7, 8, 9" in said.err
+    assert "left out, not in the tank at the end: 6, 7, 8, 9" in said.err
     assert not (run.folder / "export" / "blocks.csv").exists()
     with path.open() as file:
         table = list(csv.DictReader(file))
