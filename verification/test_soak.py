@@ -89,9 +89,7 @@ def test_signal_to_mpirun(parallel_shop: Shop, number: int, tmp_path: Path) -> N
 
 @pytest.mark.xdist_group("ranks")
 @pytest.mark.parametrize("way", ["moved", "unseen in place"])
-def test_folder_moved_from_ranks(
-    parallel_shop: full_disk.Workshop, way: str, tmp_path: Path
-) -> None:
+def test_folder_moved_from_ranks(parallel_shop: Shop, way: str, tmp_path: Path) -> None:
     said, found = moved_folders.trial(parallel_shop, way, 0.5, tmp_path)
     assert found == [], said
 
