@@ -63,18 +63,34 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, c, l, n_filled
+    integer :: d, s, c, l, n_filled, from(n_halo)
+    real(wp) :: factor, shift
 
     n_filled = n_halo
     if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(u, n_halo, d, layers)
       if (grid%periodic(d)) cycle
-      !$omp parallel do private(s, c) schedule(static)
+      !$omp parallel do private(s, c, factor, shift, from) schedule(static)
       do l = 1, size(u, shared_by(d))
         do c = 1, 3
           do s = 1, 2
-            if (grid%at_side(s, d)) call fill_component(grid, s, d, c, n_filled, l, u(:, :, :, c))
+            ! Halo of component c of the velocity in plane l outside side s of direction d, so many
+            ! layers.
+            if (grid%at_side(s, d)) then
+              factor = 1.0_wp
+              shift = 0.0_wp
+              if (grid%side(s, d) == side_no_slip .or. (is_wall(grid%side(s, d)) .and. c == d)) then
+                factor = -1.0_wp
+                shift = 2.0_wp*grid%side_velocity(c, s, d)
+              else if (grid%side(s, d) == side_inflow) then
+                factor = 0.0_wp
+                shift = grid%side_velocity(c, s, d)
+              end if
+              from = inner_layer(grid, s, d, merge(depth, 1, is_wall(grid%side(s, d))))
+              call fill_layers(d, l, ghost_layer(grid, s, d, depth), from(:n_filled), factor, &
+                               shift, u(:, :, :, c))
+            end if
           end do
         end do
       end do
@@ -87,27 +103,6 @@ contains
 
     shared_by = merge(2, 3, d == 3)
   end function shared_by
-
-  !> Halo of component c of the velocity in plane l outside side s of direction d, so many layers.
-  pure subroutine fill_component(grid, s, d, c, layers, l, u)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: s, d, c, layers, l
-    real(wp), intent(inout), contiguous :: u(:, :, :)
-    real(wp) :: factor, shift
-    integer :: from(n_halo)
-
-    factor = 1.0_wp
-    shift = 0.0_wp
-    if (grid%side(s, d) == side_no_slip .or. (is_wall(grid%side(s, d)) .and. c == d)) then
-      factor = -1.0_wp
-      shift = 2.0_wp*grid%side_velocity(c, s, d)
-    else if (grid%side(s, d) == side_inflow) then
-      factor = 0.0_wp
-      shift = grid%side_velocity(c, s, d)
-    end if
-    from = inner_layer(grid, s, d, merge(depth, 1, is_wall(grid%side(s, d))))
-    call fill_layers(d, l, ghost_layer(grid, s, d, depth), from(:layers), factor, shift, u)
-  end subroutine fill_component
 
   !> Layers outside a side of direction d in plane l: a(to) = factor*a(from) + shift.
   pure subroutine fill_layers(d, l, to, from, factor, shift, a)

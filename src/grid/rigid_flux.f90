@@ -156,7 +156,12 @@ contains
 
       self%face(:, n) = f
       self%mine(n) = owned(grid, f(1:3), f(4))
-      self%s(:, n) = unit_fluxes(grid, f, share, nearest_arm(grid, x, bodies%x(:, b)))
+      ! Flux of the unit motions of a body through its share of a face, upwards; none through a
+      ! closed side of the domain.
+      self%s(:, n) = 0.0_wp
+      if (closed_side(grid, f(f(4)), f(4))) return
+      self%s(1:3, n) = grid%area(f(4))*share*real(unit_step(:, f(4)), wp)
+      self%s(4:6, n) = cross(nearest_arm(grid, x, bodies%x(:, b)), self%s(1:3, n))
     end subroutine set_face
 
     subroutine add_to_cell(c, outflow)
@@ -177,21 +182,6 @@ contains
       self%j(e, :) = self%j(e, :) + outflow
     end subroutine add_to_cell
   end subroutine build_rigid_flux
-
-  !> Flux of the unit motions of a body through its share of a face, upwards; none through a closed
-  !! side of the domain.
-  pure function unit_fluxes(grid, f, share, arm) result(s)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: f(4)      !! cell and direction of the lower face
-    real(wp), intent(in) :: share    !! of the face area [-]
-    real(wp), intent(in) :: arm(3)   !! from the centre of the body [m]
-    real(wp) :: s(6)                 !! [m2, m3]
-
-    s = 0.0_wp
-    if (closed_side(grid, f(f(4)), f(4))) return
-    s(1:3) = grid%area(f(4))*share*real(unit_step(:, f(4)), wp)
-    s(4:6) = cross(arm, s(1:3))
-  end function unit_fluxes
 
   !> Middle of a lower face [m].
   pure function middle_of_face(grid, f) result(x)

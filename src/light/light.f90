@@ -176,6 +176,7 @@ contains
     real(wp) :: before   ! V_w [m3]
     logical :: rests
     integer :: b
+    real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
 
     light%wet_before = light%wet
     light%x = blocks%x
@@ -190,7 +191,19 @@ contains
       rests = blocks%asleep(b) .or. (blocks%fixed(b) .and. all(abs(blocks%v(:, b)) <= 0.0_wp) &
                                      .and. all(abs(blocks%omega(:, b)) <= 0.0_wp))
       if (.not. (initialised(b) .and. rests .and. abs(light%wet(b) - before) <= 0.0_wp)) then
-        if (.not. blocks%fixed(b)) call carry_water(b, before, initialised(b), light, blocks)
+        ! Let free block b carry what is below the level now. Water that comes along takes momentum
+        ! from it, water left behind takes its own away.
+        if (.not. blocks%fixed(b)) then
+          call load_block(b, light, blocks)
+          left = (loaded_mass(light, blocks, b, before)/blocks%mass(b))**entry_loss
+          turned = growth(light, blocks, b, before)/growth(light, blocks, b, light%wet(b))
+          if (initialised(b) .and. light%wet(b) > before) then
+            blocks%v(:, b) = light%current + left*(blocks%v(:, b) - light%current)
+            blocks%omega(:, b) = turned*blocks%omega(:, b)
+          else
+            blocks%l(:, b) = blocks%l(:, b)/turned
+          end if
+        end if
         call find_force(gravity, b, blocks, light)
       end if
       initialised(b) = .true.
@@ -317,27 +330,6 @@ contains
         /growth(light, blocks, b, light%wet(b))
     end associate
   end subroutine load_block
-
-  !> Let free block b carry what is below the level now. Water that comes along takes momentum from
-  !! it, water left behind takes its own away.
-  subroutine carry_water(b, before, initialised, light, blocks)
-    integer, intent(in) :: b
-    real(wp), intent(in) :: before   !! V_w of the step before [m3]
-    logical, intent(in) :: initialised      !! else it has just appeared, and keeps its velocities
-    type(light_t), intent(in) :: light
-    type(blocks_t), intent(inout) :: blocks
-    real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
-
-    call load_block(b, light, blocks)
-    left = (loaded_mass(light, blocks, b, before)/blocks%mass(b))**entry_loss
-    turned = growth(light, blocks, b, before)/growth(light, blocks, b, light%wet(b))
-    if (initialised .and. light%wet(b) > before) then
-      blocks%v(:, b) = light%current + left*(blocks%v(:, b) - light%current)
-      blocks%omega(:, b) = turned*blocks%omega(:, b)
-    else
-      blocks%l(:, b) = blocks%l(:, b)/turned
-    end if
-  end subroutine carry_water
 
   !> Buoyancy and drag of block b.
   subroutine find_force(gravity, b, blocks, light)

@@ -67,9 +67,11 @@ contains
   function added_diagonal(panels) result(a)
     type(panels_t), intent(in) :: panels
     real(wp) :: a(6)
-    real(wp) :: given(6, panels%n), sigma(6, panels%n), potential(6)
+    real(wp) :: given(6, panels%n), sigma(6, panels%n), change(6, panels%n), potential(6)
     real(wp), allocatable :: speed(:, :), inverse_distance(:, :)   ! (sources, places)
-    integer :: i
+    integer :: i, round
+    real(wp), parameter :: relaxation = 1.3_wp, tolerance = 1.0e-8_wp
+    integer, parameter :: max_rounds = 300
 
     allocate (speed(panels%n, panels%n), inverse_distance(panels%n, panels%n))
     call influence(panels, speed, inverse_distance)
@@ -77,7 +79,18 @@ contains
       given(1:3, i) = panels%normal(:, i)
       given(4:6, i) = cross(panels%centre(:, i), panels%normal(:, i))
     end do
-    call find_sources(speed, given, sigma)
+    ! Sources that give the normal velocities: sigma += relaxation (given - velocity). The operator
+    ! has its eigenvalues in (0, 1], those of a sphere (l + 1)/(2 l + 1).
+    sigma = given
+    do round = 1, max_rounds
+      !$omp parallel do private(i) schedule(static)
+      do i = 1, panels%n
+        change(:, i) = relaxation*(given(:, i) - matmul(sigma, speed(:, i)))
+      end do
+      !$omp end parallel do
+      sigma = sigma + change
+      if (all(maxval(abs(change), 2) <= tolerance*maxval(abs(sigma), 2))) exit
+    end do
     a = 0.0_wp
     do i = 1, panels%n
       a(1:3) = a(1:3) + panels%area(i)*sigma(1:3, i)*panels%centre(:, i)
@@ -138,29 +151,5 @@ contains
       pull = pull - log_term*out
     end do
   end subroutine integrate_panel
-
-  !> Sources that give the normal velocities: sigma += relaxation (given - velocity).
-  !!
-  !! The operator has its eigenvalues in (0, 1], those of a sphere (l + 1)/(2 l + 1).
-  subroutine find_sources(speed, given, sigma)
-    real(wp), intent(in) :: speed(:, :)    !! (sources, places) [-]
-    real(wp), intent(in) :: given(:, :)    !! (6, places) [m/s, and m2/s for a rotation]
-    real(wp), intent(out) :: sigma(:, :)   !! (6, sources)
-    real(wp), parameter :: relaxation = 1.3_wp, tolerance = 1.0e-8_wp
-    integer, parameter :: max_rounds = 300
-    real(wp) :: change(6, size(given, 2))
-    integer :: round, i
-
-    sigma = given
-    do round = 1, max_rounds
-      !$omp parallel do private(i) schedule(static)
-      do i = 1, size(given, 2)
-        change(:, i) = relaxation*(given(:, i) - matmul(sigma, speed(:, i)))
-      end do
-      !$omp end parallel do
-      sigma = sigma + change
-      if (all(maxval(abs(change), 2) <= tolerance*maxval(abs(sigma), 2))) exit
-    end do
-  end subroutine find_sources
 
 end module panel_method_m

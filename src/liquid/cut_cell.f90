@@ -80,7 +80,10 @@ contains
         from = v
         here = p%adjacent(slot, v)
         do step = 1, p%n   ! along the face to the left of the edge, back to v
-          at = slot_before(p%adjacent(:, here), from)
+          ! Slot before the one that holds a neighbour, cyclic.
+          at = 2
+          if (p%adjacent(1, here) == from) at = 3
+          if (p%adjacent(2, here) == from) at = 1
           done(at, here) = .true.
           to = p%adjacent(at, here)
           if (to == v) exit
@@ -91,16 +94,6 @@ contains
       end do
     end do
   end subroutine add_tetrahedron
-
-  !> Slot before the one that holds a neighbour, cyclic.
-  pure function slot_before(adjacent, neighbour) result(slot)
-    integer, intent(in) :: adjacent(3), neighbour
-    integer :: slot
-
-    slot = 2
-    if (adjacent(1) == neighbour) slot = 3
-    if (adjacent(2) == neighbour) slot = 1
-  end function slot_before
 
   !> Add one tetrahedron inside the unit cube.
   subroutine add_piece(apex, p, q, r, sense, self)

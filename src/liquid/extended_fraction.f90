@@ -80,49 +80,21 @@ contains
     type(solid_geometry_t), intent(in) :: solid   !! of the same time as the liquid
     type(extended_fraction_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
-    integer :: pass
+    integer :: pass, i, j, k, l, n
 
-    call cells_without_solid(grid, solid, flow%liquid, flow%fluid_volume, flow%c)
-    call list_solid_cells(grid, solid, self)
-    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
-    self%has_plane(1:self%n) = .true.
-    do pass = 1, plane_passes
-      call planes_of_cut_cells(grid, solid, flow%liquid, flow%fluid_volume, pass == 1, self, flow%c)
-    end do
-    call forget_solid_cells(solid, self, flow%c)
-    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
-    call fill_scalar_halo(grid, flow%c)
-  end subroutine extend_fraction
-
-  !> C^ = W/Vt where there is no solid, unknown elsewhere.
-  subroutine cells_without_solid(grid, solid, liquid, fluid_volume, c)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, fluid_volume
-    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
-
+    ! C^ = W/Vt where there is no solid, unknown elsewhere.
     !$omp parallel do private(i, j) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          c(i, j, k) = unknown
+          flow%c(i, j, k) = unknown
           if (solid%alpha(i, j, k) <= 0.0_wp) then
-            c(i, j, k) = liquid_share(liquid(i, j, k), fluid_volume(i, j, k))
+            flow%c(i, j, k) = liquid_share(flow%liquid(i, j, k), flow%fluid_volume(i, j, k))
           end if
         end do
       end do
     end do
-  end subroutine cells_without_solid
-
-  !> The cells of this process that hold solid; all of them still lack a value.
-  subroutine list_solid_cells(grid, solid, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    type(extended_fraction_t), intent(inout) :: self
-    integer :: i, j, k, n
-
+    ! The cells of this process that hold solid; all of them still lack a value.
     n = 0
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
@@ -138,7 +110,20 @@ contains
     call ensure_capacity(n, self%open_list)
     call ensure_capacity(n, self%has_plane)
     call ensure_capacity(n, self%value)
-  end subroutine list_solid_cells
+    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
+    self%has_plane(1:self%n) = .true.
+    do pass = 1, plane_passes
+      call planes_of_cut_cells(grid, solid, flow%liquid, flow%fluid_volume, pass == 1, self, flow%c)
+    end do
+    ! Cells almost or fully solid lose their value again, to get that of the finished row.
+    do l = 1, self%n
+      associate (at => self%cell(:, l))
+        if (nearly_solid(solid, at)) flow%c(at(1), at(2), at(3)) = unknown
+      end associate
+    end do
+    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
+    call fill_scalar_halo(grid, flow%c)
+  end subroutine extend_fraction
 
   !> Give cells without a value the mean of their neighbours in the row, ring by ring; where a whole
   !! row has none, one step up and down, and on along the row.
@@ -322,19 +307,5 @@ contains
 
     yes = 1.0_wp - solid%alpha(at(1), at(2), at(3)) <= min_open_volume
   end function nearly_solid
-
-  !> Cells almost or fully solid lose their value again, to get that of the finished row.
-  subroutine forget_solid_cells(solid, self, c)
-    type(solid_geometry_t), intent(in) :: solid
-    type(extended_fraction_t), intent(in) :: self
-    real(wp), intent(inout), allocatable :: c(:, :, :)
-    integer :: l
-
-    do l = 1, self%n
-      associate (at => self%cell(:, l))
-        if (nearly_solid(solid, at)) c(at(1), at(2), at(3)) = unknown
-      end associate
-    end do
-  end subroutine forget_solid_cells
 
 end module extended_fraction_m

@@ -68,30 +68,11 @@ contains
     integer, intent(in) :: d
     type(carried_volumes_t), intent(inout) :: volumes
     type(liquid_sweep_t), intent(inout) :: self
-
-    call mixed_outflow(grid, d, volumes, self)
-    call list_mixed_cells(grid, d, volumes, self)
-    call plane_outflow(grid, old, d, volumes, self)
-    call halo_exchange(self%out_low, n_halo, d)
-    call halo_exchange(self%out_high, n_halo, d)
-    call outflow_of_sides(grid, d, volumes, self)
-    call swap(volumes%w, volumes%w_before)
-    call swap(volumes%v, volumes%v_before)
-    call move_volumes(grid, old, d, self, volumes)
-    call fill_scalar_halo(grid, volumes%v)
-    call fill_scalar_halo(grid, volumes%c)
-  end subroutine sweep_volumes
-
-  !> Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit. Rests at
-  !! round-off of liquid in gas or of gas in liquid stay where they are instead of spreading.
-  subroutine mixed_outflow(grid, d, volumes, self)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: d
-    type(carried_volumes_t), intent(in) :: volumes
-    type(liquid_sweep_t), intent(inout) :: self
-    integer :: i, j, k, e(3)
+    integer :: i, j, k, e(3), s, a(3), b(3)
     real(wp) :: share
 
+    ! Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit. Rests at
+    ! round-off of liquid in gas or of gas in liquid stay where they are instead of spreading.
     e = unit_step(:, d)
     !$omp parallel do private(i, j, share) schedule(static)
     do k = grid%lo(3), grid%hi(3)
@@ -105,7 +86,34 @@ contains
         end do
       end do
     end do
-  end subroutine mixed_outflow
+    call list_mixed_cells(grid, d, volumes, self)
+    call plane_outflow(grid, old, d, volumes, self)
+    call halo_exchange(self%out_low, n_halo, d)
+    call halo_exchange(self%out_high, n_halo, d)
+    ! Liquid that comes in through the sides of the domain, as outflow of the halo cell behind them.
+    e = unit_step(:, d)
+    do s = 1, 2
+      call grid%side_faces(s, d, a, b)
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            if (s == 1) then
+              self%out_high(i - e(1), j - e(2), k - e(3)) = max(volumes%q(i, j, k, d), 0.0_wp) &
+                *incoming_share(grid, volumes%c, self, s, d, [i, j, k])
+            else
+              self%out_low(i, j, k) = max(-volumes%q(i, j, k, d), 0.0_wp) &
+                *incoming_share(grid, volumes%c, self, s, d, [i, j, k] - e)
+            end if
+          end do
+        end do
+      end do
+    end do
+    call swap(volumes%w, volumes%w_before)
+    call swap(volumes%v, volumes%v_before)
+    call move_volumes(grid, old, d, self, volumes)
+    call fill_scalar_halo(grid, volumes%v)
+    call fill_scalar_halo(grid, volumes%c)
+  end subroutine sweep_volumes
 
   !> Cells with liquid and gas that give volume in direction d, in the order of the grid.
   subroutine list_mixed_cells(grid, d, volumes, self)
@@ -164,12 +172,12 @@ contains
     integer, intent(in) :: d
     type(carried_volumes_t), intent(in) :: volumes
     type(liquid_sweep_t), intent(inout) :: self
-    integer :: l, i, j, k, f(3)
-    real(wp) :: m(3), w, v, out(2), liquid(2), clamped, largest
+    integer :: l, i, j, k, f(3), s
+    real(wp) :: m(3), w, v, out(2), liquid(2), clamped, largest, a, w_left, v_left, before
 
     largest = 0.0_wp
-    !$omp parallel do private(i, j, k, f, m, w, v, out, liquid, clamped) reduction(max: largest) &
-    !$omp schedule(dynamic, 16)
+    !$omp parallel do private(i, j, k, f, m, w, v, out, liquid, clamped, w_left, v_left, before, &
+    !$omp a, s) reduction(max: largest) schedule(dynamic, 16)
     do l = 1, self%n_mixed
       i = self%mixed_cell(1, l)
       j = self%mixed_cell(2, l)
@@ -180,7 +188,11 @@ contains
       out = [max(-volumes%q(i, j, k, d), 0.0_wp), max(volumes%q(f(1), f(2), f(3), d), 0.0_wp)]
       m = surface_normal(grid, old, self%vertical, volumes%c, i, j, k)
       if (old%cut(i, j, k) == 0) then
-        liquid = v*slabs_of_box(m, w/v, d, out/v)
+        ! Liquid in the slabs beside the two faces of a cell without solid [share of the cell].
+        a = unit_constant(m, w/v)
+        liquid(1) = unit_slab(m, a, d, 1, out(1)/v)
+        liquid(2) = unit_slab(m, a, d, 2, out(2)/v)
+        liquid = v*liquid
       else
         associate (cut => self%cut(omp_get_thread_num()))
           call load_cut_cell(old, old%cut(i, j, k), grid%face([i, j, k], [1, 2, 3]), grid%h, cut)
@@ -188,27 +200,24 @@ contains
         end associate
         liquid = v*liquid
       end if
-      call guard(w, v, out, liquid, clamped)
+      ! Keep the liquid of both slabs within what there is of liquid and of gas: round-off only.
+      w_left = w
+      v_left = v
+      clamped = 0.0_wp
+      do s = 1, 2
+        before = liquid(s)
+        liquid(s) = max(liquid(s), out(s) - (v_left - w_left), 0.0_wp)
+        liquid(s) = min(liquid(s), out(s), w_left)
+        clamped = max(clamped, abs(liquid(s) - before))
+        w_left = w_left - liquid(s)
+        v_left = v_left - out(s)
+      end do
       largest = max(largest, clamped)
       self%out_low(i, j, k) = liquid(1)
       self%out_high(i, j, k) = liquid(2)
     end do
     self%clamped = max(self%clamped, largest/grid%volume)
   end subroutine plane_outflow
-
-  !> Liquid in the slabs beside the two faces of a cell without solid [share of the cell].
-  pure function slabs_of_box(m, share, d, out) result(liquid)
-    real(wp), intent(in) :: m(3)     !! normal on the unit cube
-    real(wp), intent(in) :: share    !! of liquid
-    integer, intent(in) :: d
-    real(wp), intent(in) :: out(2)   !! volumes that leave below and above [share of the cell]
-    real(wp) :: liquid(2)
-    real(wp) :: a
-
-    a = unit_constant(m, share)
-    liquid(1) = unit_slab(m, a, d, 1, out(1))
-    liquid(2) = unit_slab(m, a, d, 2, out(2))
-  end function slabs_of_box
 
   !> The same for a cut cell, all in shares of its open part.
   subroutine slabs_of_cut_cell(m, share, d, out, cut, liquid)
@@ -234,54 +243,6 @@ contains
       liquid(2) = share - part/cut%open
     end if
   end subroutine slabs_of_cut_cell
-
-  !> Keep the liquid of both slabs within what there is of liquid and of gas: round-off only.
-  pure subroutine guard(w, v, out, liquid, clamped)
-    real(wp), intent(in) :: w, v, out(2)
-    real(wp), intent(inout) :: liquid(2)
-    real(wp), intent(out) :: clamped   !! largest change
-    real(wp) :: w_left, v_left, before
-    integer :: s
-
-    w_left = w
-    v_left = v
-    clamped = 0.0_wp
-    do s = 1, 2
-      before = liquid(s)
-      liquid(s) = max(liquid(s), out(s) - (v_left - w_left), 0.0_wp)
-      liquid(s) = min(liquid(s), out(s), w_left)
-      clamped = max(clamped, abs(liquid(s) - before))
-      w_left = w_left - liquid(s)
-      v_left = v_left - out(s)
-    end do
-  end subroutine guard
-
-  !> Liquid that comes in through the sides of the domain, as outflow of the halo cell behind them.
-  subroutine outflow_of_sides(grid, d, volumes, self)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: d
-    type(carried_volumes_t), intent(in) :: volumes
-    type(liquid_sweep_t), intent(inout) :: self
-    integer :: i, j, k, s, e(3), a(3), b(3)
-
-    e = unit_step(:, d)
-    do s = 1, 2
-      call grid%side_faces(s, d, a, b)
-      do k = a(3), b(3)
-        do j = a(2), b(2)
-          do i = a(1), b(1)
-            if (s == 1) then
-              self%out_high(i - e(1), j - e(2), k - e(3)) = max(volumes%q(i, j, k, d), 0.0_wp) &
-                *incoming_share(grid, volumes%c, self, s, d, [i, j, k])
-            else
-              self%out_low(i, j, k) = max(-volumes%q(i, j, k, d), 0.0_wp) &
-                *incoming_share(grid, volumes%c, self, s, d, [i, j, k] - e)
-            end if
-          end do
-        end do
-      end do
-    end do
-  end subroutine outflow_of_sides
 
   !> Liquid share of what enters through side s of direction d into a cell: an inflow brings liquid
   !! below its level, through an outflow comes back what stands there.

@@ -120,19 +120,11 @@ contains
   subroutine small_cells(grid, self)
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self
+    real(wp) :: inflow, way
+    integer :: d, s, i, j, k, n, a(3), b(3)
 
     call give_small_cells(grid, self%volumes, self%small, self%sweeps%out_low)   ! free by now
-    self%inflow = self%inflow + inflow_of_sides(grid, self)
-  end subroutine small_cells
-
-  !> Liquid that came in through the sides of the domain in this subcycle [m3].
-  function inflow_of_sides(grid, self) result(inflow)
-    type(grid_t), intent(in) :: grid
-    type(liquid_transport_t), intent(inout) :: self
-    real(wp) :: inflow
-    integer :: d, s, i, j, k, n, a(3), b(3)
-    real(wp) :: way
-
+    ! Liquid that came in through the sides of the domain in this subcycle [m3].
     n = 0
     do d = 1, 3
       do s = 1, 2
@@ -149,7 +141,8 @@ contains
       end do
     end do
     inflow = exact_sum(self%side(1:n))
-  end function inflow_of_sides
+    self%inflow = self%inflow + inflow
+  end subroutine small_cells
 
   !> New liquid, fluid volume and C^; liquid through the sides; statistics.
   subroutine finish_transport(grid, new, self, flow)

@@ -191,24 +191,9 @@ contains
   subroutine find_parts(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
-    integer :: l, c(3)
+    integer :: l, c(3), d, e(3), m, a, b
 
-    call join_neighbours(self)
-    call join_processes(grid, self)
-    call list_parts(grid, self)
-    do l = 1, self%n
-      c = self%cell(:, l)
-      self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &
-                                     self%finder%home(1:self%parts))
-    end do
-    call sort_by_part(self)
-  end subroutine find_parts
-
-  !> Join cells of this process across faces with a conductance: `root` of each cell of the list.
-  subroutine join_neighbours(self)
-    type(narrow_band_t), intent(inout) :: self
-    integer :: l, d, c(3), e(3), m, a, b
-
+    ! Join cells of this process across faces with a conductance: `root` of each cell of the list.
     do l = 1, self%n
       self%finder%root(l) = l
     end do
@@ -228,7 +213,15 @@ contains
       call find_root(self%finder%root, l, self%finder%part(l))
     end do
     self%finder%root(1:self%n) = self%finder%part(1:self%n)
-  end subroutine join_neighbours
+    call join_processes(grid, self)
+    call list_parts(grid, self)
+    do l = 1, self%n
+      c = self%cell(:, l)
+      self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &
+                                     self%finder%home(1:self%parts))
+    end do
+    call sort_by_part(self)
+  end subroutine find_parts
 
   !> Root of a cell; the path to it is shortened for the next call.
   pure subroutine find_root(root, l, found)
@@ -247,7 +240,7 @@ contains
   subroutine join_processes(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
-    integer :: l, c(3)
+    integer :: l, c(3), d, s, f(3), nb(3)
     integer(i8) :: changes(1)
 
     associate (smallest => self%finder%part)
@@ -265,31 +258,24 @@ contains
         do l = 1, self%n
           c = self%cell(:, l)
           if (all(c > grid%lo .and. c < grid%hi)) cycle
-          call look_across(c, smallest(self%finder%root(l)))
+          ! Take over a smaller label from a neighbour behind an open face.
+          do d = 1, 3
+            do s = 0, 1
+              f = c + s*unit_step(:, d)
+              nb = c + (2*s - 1)*unit_step(:, d)
+              if (.not. self%k(f(1), f(2), f(3), d) > 0.0_wp) cycle
+              if (self%label(nb(1), nb(2), nb(3)) == 0) cycle
+              if (self%label(nb(1), nb(2), nb(3)) >= smallest(self%finder%root(l))) cycle
+              smallest(self%finder%root(l)) = self%label(nb(1), nb(2), nb(3))
+              changes = changes + 1_i8
+            end do
+          end do
         end do
         call global_sum(changes)
         if (changes(1) == 0_i8) exit
       end do
     end associate
   contains
-    !> Take over a smaller label from a neighbour behind an open face.
-    subroutine look_across(c, label)
-      integer, intent(in) :: c(3)
-      integer, intent(inout) :: label
-      integer :: d, s, f(3), nb(3)
-
-      do d = 1, 3
-        do s = 0, 1
-          f = c + s*unit_step(:, d)
-          nb = c + (2*s - 1)*unit_step(:, d)
-          if (.not. self%k(f(1), f(2), f(3), d) > 0.0_wp) cycle
-          if (self%label(nb(1), nb(2), nb(3)) == 0) cycle
-          if (self%label(nb(1), nb(2), nb(3)) >= label) cycle
-          label = self%label(nb(1), nb(2), nb(3))
-          changes = changes + 1_i8
-        end do
-      end do
-    end subroutine look_across
   end subroutine join_processes
 
   !> The labels of all parts on all processes, rising.

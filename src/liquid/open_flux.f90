@@ -67,6 +67,8 @@ contains
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! those of the velocity on entry [m3]
     logical :: balanced
+    type(solve_report_t) :: report   ! the next step makes good what is left
+    integer :: k, l
 
     self%iterations = 0
     self%residual = 0.0_wp
@@ -76,13 +78,40 @@ contains
     call find_balances(grid, new, fluid_volume, q, self%band)
     call sum_by_part(grid, self%band)
     if (excess_stays(grid, fluid_volume, self%band)) then
-      call widen_to_domain(grid, old, new, self%band)
+      ! All cells of the domain are the band, in this step.
+      self%band%poses = 0
+      self%band%marked = 0
+      self%band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
+      call halo_exchange(self%band%marked, 1)
+      call find_conductances(grid, old%aperture, new%aperture, self%band)
+      call reserve_for_all(grid, self%band)
+      call list_band(grid, self%band)
+      call find_parts(grid, self%band)
       call find_balances(grid, new, fluid_volume, q, self%band)
       call sum_by_part(grid, self%band)
     end if
     call balance_parts(self, balanced)
     if (balanced) return
-    call solve_potential(solver, self)
+    ! Solve `sum_f k_f (phi_c - phi_nb) = r_c` on the band; the potential is zero elsewhere.
+    !$omp parallel do schedule(static)
+    do k = lbound(solver%rhs, 3), ubound(solver%rhs, 3)
+      solver%rhs(:, :, k) = 0.0_wp
+      solver%x(:, :, k) = 0.0_wp
+    end do
+    do l = 1, self%band%n
+      associate (c => self%band%cell(:, l))
+        solver%rhs(c(1), c(2), c(3)) = self%band%r(l)
+      end associate
+    end do
+    call find_open_lines(self%band%k, self%band%line)
+    solver%work%line = self%band%line
+    solver%work%singular = .false.   ! parts without an open side have been balanced
+    call solver%multigrid%setup(self%band%k)
+    call conjugate_gradient(self%band, solver%multigrid, solver%rhs, solver%x, self%control, &
+                            report, solver%work)
+    call halo_exchange(solver%x, 1)
+    self%iterations = report%iterations
+    self%residual = report%residual
     call correct_flux(grid, self%band, solver%x, q)
   end subroutine fit_to_bodies
 
@@ -92,8 +121,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
     type(narrow_band_t), intent(inout) :: band
-    real(wp) :: cells(1)
-    logical :: solids
+    real(wp) :: cells(1), of_all(1)
+    integer :: i, j, k, most
 
     if (all([old%poses, new%poses] > 0) .and. all(band%poses == [old%poses, new%poses])) then
       if (band%parts > 0) call find_conductances(grid, old%aperture, new%aperture, band)
@@ -101,51 +130,33 @@ contains
     end if
     band%poses = [old%poses, new%poses]
     band%parts = 0
-    call mark_solids(grid, old, new, band%marked, solids)
-    if (.not. solids) return
-    call mark_band(band)
+    ! Mark the own cells with solid at the begin or the end of the step.
+    most = 0
+    !$omp parallel do private(i, j) reduction(max: most) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          band%marked(i, j, k) = merge(1, 0, old%alpha(i, j, k) > 0.0_wp &
+                                       .or. new%alpha(i, j, k) > 0.0_wp)
+          most = max(most, band%marked(i, j, k))
+        end do
+      end do
+    end do
+    of_all = real(most, wp)
+    call global_max(of_all)
+    if (of_all(1) <= 0.0_wp) return
+    ! The marked cells and the ring around them.
+    call halo_exchange(band%marked, 1)
+    call widen(1, band%marked, band%label)
+    call widen(2, band%label, band%number)
+    call widen(3, band%number, band%marked)
+    call halo_exchange(band%marked, 1)
     call find_conductances(grid, old%aperture, new%aperture, band)
     call list_band(grid, band)
     cells = real(band%n, wp)
     call global_max(cells)
     if (cells(1) > 0.5_wp) call find_parts(grid, band)
   end subroutine find_band
-
-  !> Mark the own cells with solid at the begin or the end of the step.
-  subroutine mark_solids(grid, old, new, mark, there)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old, new
-    integer, intent(inout), contiguous :: mark(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
-    logical, intent(out) :: there   !! some process has such cells
-    integer :: i, j, k, most
-    real(wp) :: of_all(1)
-
-    most = 0
-    !$omp parallel do private(i, j) reduction(max: most) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          mark(i, j, k) = merge(1, 0, old%alpha(i, j, k) > 0.0_wp &
-                                .or. new%alpha(i, j, k) > 0.0_wp)
-          most = max(most, mark(i, j, k))
-        end do
-      end do
-    end do
-    of_all = real(most, wp)
-    call global_max(of_all)
-    there = of_all(1) > 0.0_wp
-  end subroutine mark_solids
-
-  !> The marked cells and the ring around them.
-  subroutine mark_band(band)
-    type(narrow_band_t), intent(inout) :: band
-
-    call halo_exchange(band%marked, 1)
-    call widen(1, band%marked, band%label)
-    call widen(2, band%label, band%number)
-    call widen(3, band%number, band%marked)
-    call halo_exchange(band%marked, 1)
-  end subroutine mark_band
 
   !> Marks of cells and their neighbours in direction d. Called for the directions in their order,
   !! it treats own cells in those up to d, and the halo in those that follow.
@@ -332,22 +343,6 @@ contains
     yes = most(1) > excess_max
   end function excess_stays
 
-  !> All cells of the domain are the band, in this step.
-  subroutine widen_to_domain(grid, old, new, band)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old, new
-    type(narrow_band_t), intent(inout) :: band
-
-    band%poses = 0
-    band%marked = 0
-    band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
-    call halo_exchange(band%marked, 1)
-    call find_conductances(grid, old%aperture, new%aperture, band)
-    call reserve_for_all(grid, band)
-    call list_band(grid, band)
-    call find_parts(grid, band)
-  end subroutine widen_to_domain
-
   !> What the balances of a part without an open side sum up to is taken out of its cells in
   !! proportion to their open volume, so that closing cells still empty. Parts that balance then
   !! need no solution; all of them do if `balanced`.
@@ -375,42 +370,6 @@ contains
       end do
     end associate
   end subroutine balance_parts
-
-  !> Solve `sum_f k_f (phi_c - phi_nb) = r_c` on the band; the potential is zero elsewhere.
-  subroutine solve_potential(s, self)
-    type(elliptic_solver_t), intent(inout) :: s
-    type(open_flux_t), intent(inout) :: self
-    type(solve_report_t) :: report   ! the next step makes good what is left
-
-    call put_balances(self%band, lbound(s%rhs), s%rhs, s%x)
-    call find_open_lines(self%band%k, self%band%line)
-    s%work%line = self%band%line
-    s%work%singular = .false.   ! parts without an open side have been balanced
-    call s%multigrid%setup(self%band%k)
-    call conjugate_gradient(self%band, s%multigrid, s%rhs, s%x, self%control, report, s%work)
-    call halo_exchange(s%x, 1)
-    self%iterations = report%iterations
-    self%residual = report%residual
-  end subroutine solve_potential
-
-  !> Put the balances of the cells of the band on the grid, zero elsewhere; no potential yet.
-  subroutine put_balances(band, first, r, phi)
-    type(narrow_band_t), intent(in) :: band
-    integer, intent(in) :: first(3)
-    real(wp), intent(inout), dimension(first(1):, first(2):, first(3):), contiguous :: r, phi
-    integer :: k, l
-
-    !$omp parallel do schedule(static)
-    do k = first(3), ubound(r, 3)
-      r(:, :, k) = 0.0_wp
-      phi(:, :, k) = 0.0_wp
-    end do
-    do l = 1, band%n
-      associate (c => band%cell(:, l))
-        r(c(1), c(2), c(3)) = band%r(l)
-      end associate
-    end do
-  end subroutine put_balances
 
   !> Take the gradient of the potential from the volumes.
   subroutine correct_flux(grid, band, phi, q)

@@ -198,7 +198,7 @@ contains
     real(wp) :: m(3)
     real(wp) :: layer(-1:1, -1:1, 3)   !! sums over the lines of a direction
     real(wp) :: line(-1:1, 3)          !! sums over the layers normal to a direction
-    real(wp) :: tilt(3, 3), main, best
+    real(wp) :: tilt(3, 3), main, best, young(3)
     integer :: d
 
     layer(:, :, 1) = c(-1, :, :) + c(0, :, :) + c(1, :, :)
@@ -222,22 +222,12 @@ contains
         m = tilt(:, d)*main
       end if
     end do
-    m = flatter(m, best, youngs(c))
+    ! The normal of Youngs where it is less aligned with an axis.
+    young = youngs(c)
+    if (sum(abs(young)) > 0.0_wp .and. (best < 0.0_wp .or. best > maxval(abs(young)))) m = young
     where (abs(m) < min_component) m = 0.0_wp
     if (any(abs(m) > 0.0_wp)) m = m/sum(abs(m))
   end function unit_normal
-
-  !> The centred normal, or that of Youngs where it is less aligned with an axis.
-  pure function flatter(centred, main, young) result(m)
-    real(wp), intent(in) :: centred(3)
-    real(wp), intent(in) :: main       !! its largest component, negative: there is none
-    real(wp), intent(in) :: young(3)
-    real(wp) :: m(3)
-
-    m = centred
-    if (sum(abs(young)) <= 0.0_wp) return
-    if (main < 0.0_wp .or. main > maxval(abs(young))) m = young
-  end function flatter
 
   !> Downhill direction of the shares by Youngs' weights, sizes adding up to one, or zero.
   pure function youngs(c) result(m)

@@ -66,25 +66,10 @@ contains
     type(solid_geometry_t), intent(in) :: old
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
-
-    call mark_small_cells(grid, old, volumes, self%number)
-    call list_marked(grid, lbound(self%number), self%number, self%cell, self%n)
-    call ensure_capacity(self%n, self%amount)
-    call ensure_capacity(self%n, self%mass)
-    call ensure_capacity(self%n, self%ratio)
-    call halo_exchange(self%number, n_halo, layers=1)
-    call find_implicit_faces(grid, volumes, self)
-  end subroutine find_small_cells
-
-  !> One for small cells, zero for others.
-  subroutine mark_small_cells(grid, old, volumes, mark)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old
-    type(carried_volumes_t), intent(in) :: volumes
-    integer, intent(inout), contiguous :: mark(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
     real(wp) :: outflow, open
 
+    ! One for small cells, zero for others.
     !$omp parallel do private(i, j, outflow, open) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
@@ -93,12 +78,18 @@ contains
                     + max(volumes%q(i, j + 1, k, 2), 0.0_wp) + max(-volumes%q(i, j, k, 2), 0.0_wp) &
                     + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
           open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
-          mark(i, j, k) = merge(0, 1, outflow <= max_outflow*open &
-                                      .and. open >= min_volume*grid%volume)
+          self%number(i, j, k) = merge(0, 1, outflow <= max_outflow*open &
+                                       .and. open >= min_volume*grid%volume)
         end do
       end do
     end do
-  end subroutine mark_small_cells
+    call list_marked(grid, lbound(self%number), self%number, self%cell, self%n)
+    call ensure_capacity(self%n, self%amount)
+    call ensure_capacity(self%n, self%mass)
+    call ensure_capacity(self%n, self%ratio)
+    call halo_exchange(self%number, n_halo, layers=1)
+    call find_implicit_faces(grid, volumes, self)
+  end subroutine find_small_cells
 
   !> Faces with a small donor: listed, and taken out of the sweeps.
   subroutine find_implicit_faces(grid, volumes, self)

@@ -93,8 +93,13 @@ contains
     type(time_step_t), intent(in) :: time_step
     type(scratch_t), intent(inout) :: scratch
     type(fluid_transport_t), intent(inout) :: self
+    real(wp), parameter :: round_off = 1.0e-9_wp
 
-    self%liquid%subcycles = subcycles_of_step(time_step%courant)
+    ! Number of equal subcycles in which the volumes of a step move, so that none passes the Courant
+    ! number that the sweeps can follow.
+    self%liquid%subcycles = ceiling(min(time_step%courant/subcycle_courant - round_off, &
+                                        real(max_subcycles, wp)))
+    self%liquid%subcycles = max(self%liquid%subcycles, 1)
     call take_arrays(scratch, self)
   end subroutine begin_carrying
 
@@ -161,16 +166,5 @@ contains
     call finish_transport(grid, after, self%liquid, flow)
     call give_arrays(scratch, self)
   end subroutine finish_carrying
-
-  !> Number of equal subcycles in which the volumes of a step move, so that none passes the Courant
-  !! number that the sweeps can follow.
-  pure function subcycles_of_step(courant) result(subcycles)
-    real(wp), intent(in) :: courant   !! of the whole step [-]
-    integer :: subcycles
-    real(wp), parameter :: round_off = 1.0e-9_wp
-
-    subcycles = ceiling(min(courant/subcycle_courant - round_off, real(max_subcycles, wp)))
-    subcycles = max(subcycles, 1)
-  end function subcycles_of_step
 
 end module fluid_transport_m

@@ -106,25 +106,11 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
-
-    call sweep(grid, old, d, transport)
-    call move_momentum(grid, fluid, d, transport%volumes, u, self)
-    call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
-                              self%momentum, u)
-  end subroutine momentum_sweep
-
-  !> The momentum after what crosses the faces in direction d. A thread goes through its planes one
-  !! by one and keeps what crosses the faces of two.
-  subroutine move_momentum(grid, fluid, d, volumes, u, self)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: d
-    type(carried_volumes_t), intent(in) :: volumes
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
-    type(momentum_t), intent(inout) :: self
     integer :: k, me, e(3), low, high, at_hand   ! place of the lower and of the upper faces
 
+    call sweep(grid, old, d, transport)
+    ! The momentum after what crosses the faces in direction d. A thread goes through its planes one
+    ! by one and keeps what crosses the faces of two.
     e = unit_step(:, d)
     !$omp parallel private(k, me, low, high, at_hand)
     me = omp_get_thread_num()
@@ -133,14 +119,16 @@ contains
     do k = grid%lo(3), grid%hi(3)
       low = modulo(k, 2)
       high = modulo(k + e(3), 2)
-      if (at_hand < k) call carry_plane(grid, fluid, d, k, volumes, u, self)
+      if (at_hand < k) call carry_plane(grid, fluid, d, k, transport%volumes, u, self)
       at_hand = k + e(3)
-      if (e(3) == 1) call carry_plane(grid, fluid, d, k + 1, volumes, u, self)
+      if (e(3) == 1) call carry_plane(grid, fluid, d, k + 1, transport%volumes, u, self)
       call exchange_in_plane(grid, e, k, self%carried(:, :, :, low, me), &
                              self%carried(:, :, :, high, me), self%momentum)
     end do
     !$omp end parallel
-  end subroutine move_momentum
+    call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
+                              self%momentum, u)
+  end subroutine momentum_sweep
 
   !> Momentum of the cells of plane k after what crosses their lower and upper faces.
   subroutine exchange_in_plane(grid, e, k, lower, upper, momentum)

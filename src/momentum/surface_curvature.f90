@@ -53,25 +53,11 @@ contains
       !! C^, halo filled [-]
     type(surface_curvature_t), intent(inout) :: self
     integer(i8) :: cells(1)
-
-    call find_places(grid, c, self%place)
-    call curvature_from_heights(grid, solid, c, self)
-    call list_wanted(grid, self)
-    call curvature_from_others(grid, c, self)
-    cells = int(self%n_wanted, i8)
-    call global_sum(cells)
-    self%fallback = int(cells(1))
-  end subroutine find_curvature
-
-  !> Curvature of every own cell that holds or borders the surface, where its columns give one.
-  subroutine curvature_from_heights(grid, solid, c, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-    type(surface_curvature_t), intent(inout) :: self
-    integer :: i, j, k
+    integer :: i, j, k, n
     logical :: found
 
+    call find_places(grid, c, self%place)
+    ! Curvature of every own cell that holds or borders the surface, where its columns give one.
     !$omp parallel do private(i, j, found) schedule(dynamic, 4)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
@@ -87,7 +73,25 @@ contains
     end do
     call halo_exchange(self%curvature, n_halo)
     call halo_exchange(self%state, n_halo)
-  end subroutine curvature_from_heights
+    ! List the own cells that have no curvature from heights.
+    n = 0
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          if (self%state(i, j, k) /= wanted) cycle
+          n = n + 1
+          call ensure_capacity(n, self%cell)
+          self%cell(:, n) = [i, j, k]
+        end do
+      end do
+    end do
+    self%n_wanted = n
+    call ensure_capacity(n, self%value)
+    call curvature_from_others(grid, c, self)
+    cells = int(self%n_wanted, i8)
+    call global_sum(cells)
+    self%fallback = int(cells(1))
+  end subroutine find_curvature
 
   !> Does the surface pass through a cell or through one of its faces?
   pure function at_surface(grid, c, i, j, k) result(yes)
@@ -173,33 +177,13 @@ contains
     normal = normal/max(norm2(normal), tiny(1.0_wp))
   end function normal_at
 
-  !> List the own cells that have no curvature from heights.
-  subroutine list_wanted(grid, self)
-    type(grid_t), intent(in) :: grid
-    type(surface_curvature_t), intent(inout) :: self
-    integer :: i, j, k, n
-
-    n = 0
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          if (self%state(i, j, k) /= wanted) cycle
-          n = n + 1
-          call ensure_capacity(n, self%cell)
-          self%cell(:, n) = [i, j, k]
-        end do
-      end do
-    end do
-    self%n_wanted = n
-    call ensure_capacity(n, self%value)
-  end subroutine list_wanted
-
   !> Mean of the neighbours that have heights, or the divergence of the normals.
   subroutine curvature_from_others(grid, c, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(surface_curvature_t), intent(inout) :: self
-    integer :: l, n
+    integer :: l, n, d
+    real(wp) :: above(3), below(3)
 
     do l = 1, self%n_wanted
       associate (a => self%cell(:, l) - 1, b => self%cell(:, l) + 1)
@@ -208,7 +192,14 @@ contains
           self%value(l) = sum(self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), &
             self%state(a(1):b(1), a(2):b(2), a(3):b(3)) == from_heights)/real(n, wp)
         else
-          self%value(l) = normal_curvature(grid, c, self%cell(:, l))
+          ! Divergence of the normals of the neighbours [1/m]: rough, but never more than that of a
+          ! drop of one cell.
+          self%value(l) = 0.0_wp
+          do d = 1, 3
+            above = normal_at(grid, c, self%cell(:, l) + unit_step(:, d))
+            below = normal_at(grid, c, self%cell(:, l) - unit_step(:, d))
+            self%value(l) = self%value(l) + (above(d) - below(d))/(2.0_wp*grid%h(d))
+          end do
         end if
       end associate
     end do
@@ -221,24 +212,5 @@ contains
     call halo_exchange(self%curvature, n_halo)
     call halo_exchange(self%state, n_halo)
   end subroutine curvature_from_others
-
-  !> Divergence of the normals of the neighbours [1/m]: rough, but never more than that of a drop of
-  !! one cell.
-  pure function normal_curvature(grid, c, at) result(curvature)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! C^, halo filled [-]
-    integer, intent(in) :: at(3)
-    real(wp) :: curvature
-    real(wp) :: above(3), below(3)
-    integer :: d
-
-    curvature = 0.0_wp
-    do d = 1, 3
-      above = normal_at(grid, c, at + unit_step(:, d))
-      below = normal_at(grid, c, at - unit_step(:, d))
-      curvature = curvature + (above(d) - below(d))/(2.0_wp*grid%h(d))
-    end do
-  end function normal_curvature
 
 end module surface_curvature_m

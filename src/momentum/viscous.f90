@@ -42,12 +42,17 @@ contains
     real(wp) :: momentum(6, bodies%n)     ! of the bodies, over dt, before the stage
     real(wp) :: inverse(6, 6, bodies%n)   ! of the blocks of the bodies
     real(wp) :: bound   ! of the largest change that is left [m/s]
-    integer :: b
+    integer :: b, m
 
     call velocity_scale(grid, flow%u, bodies, bound)
     bound = tolerance*bound
     call right_side(grid, self%mass, flow%u, self%r)
-    call add_side_pull(self)
+    ! What the moving sides pull goes to the right side.
+    do m = 1, self%sides%n
+      associate (c => self%sides%cell(:, m))
+        self%r(c(1), c(2), c(3), :) = self%r(c(1), c(2), c(3), :) + self%sides%pull(:, m)
+      end associate
+    end do
     do b = 1, bodies%n
       momentum(:, b) = inertial_momentum(bodies, b, self%dt, bodies%motion(:, b))
       inverse(:, :, b) = 0.0_wp
@@ -129,7 +134,7 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(in) :: self
     real(wp), intent(out) :: worst   !! largest change by a weight of one here [m/s]
-    integer :: colour, k, low, high
+    integer :: colour, k, low, high, planes, me, n
     logical :: alone   ! with nothing to exchange
 
     worst = 0.0_wp
@@ -144,8 +149,13 @@ contains
       end if
     end do
     if (.not. alone) return
-    !$omp parallel private(k, low, high) reduction(max: worst)
-    call planes_of_thread(grid, low, high)
+    !$omp parallel private(k, low, high, planes, me, n) reduction(max: worst)
+    ! Planes low..high of this thread, none if high < low.
+    planes = grid%hi(3) - grid%lo(3) + 1
+    me = omp_get_thread_num()
+    n = omp_get_num_threads()
+    low = grid%lo(3) + planes*me/n
+    high = grid%lo(3) + planes*(me + 1)/n - 1
     do k = low, high, max(1, high - low)
       call relax_plane(grid, 1, k, weight(1), u, self, worst)
     end do
@@ -159,19 +169,6 @@ contains
     end do
     !$omp end parallel
   end subroutine relax
-
-  !> Planes low..high of the thread that asks, none if high < low.
-  subroutine planes_of_thread(grid, low, high)
-    type(grid_t), intent(in) :: grid
-    integer, intent(out) :: low, high
-    integer :: planes, me, n
-
-    planes = grid%hi(3) - grid%lo(3) + 1
-    me = omp_get_thread_num()
-    n = omp_get_num_threads()
-    low = grid%lo(3) + planes*me/n
-    high = grid%lo(3) + planes*(me + 1)/n - 1
-  end subroutine planes_of_thread
 
   !> Relax the cells of one colour in plane k by a weight; colour 1 has even sums of its numbers.
   subroutine relax_plane(grid, colour, k, weight, u, self, worst)
@@ -284,18 +281,6 @@ contains
       end do
     end do
   end subroutine right_side
-
-  !> What the moving sides pull goes to the right side.
-  pure subroutine add_side_pull(self)
-    type(viscous_t), intent(inout) :: self
-    integer :: m
-
-    do m = 1, self%sides%n
-      associate (c => self%sides%cell(:, m))
-        self%r(c(1), c(2), c(3), :) = self%r(c(1), c(2), c(3), :) + self%sides%pull(:, m)
-      end associate
-    end do
-  end subroutine add_side_pull
 
   !> Largest velocity of the fluid in own cells, of the bodies and of the sides [m/s]; never zero.
   subroutine velocity_scale(grid, u, bodies, scale)

@@ -40,7 +40,7 @@ contains
     type(viscous_t), intent(inout) :: self
     type(merged_cells_t), intent(in), optional :: merged
       !! none where there are no small cells and no rough layers
-    integer :: d, k
+    integer :: d, k, i, j
 
     self%dt = dt
     self%walls%n = 0
@@ -49,7 +49,17 @@ contains
     do k = lbound(self%diagonal, 3), ubound(self%diagonal, 3)
       self%diagonal(:, :, k, :) = 0.0_wp
     end do
-    call unknown_masses(grid, solid, rho, dt, self)
+    ! Mass over dt of each cell with its centre in the fluid; none of the others.
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          self%mass(i, j, k) = &
+            merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), min_mass)*grid%volume/dt, &
+                  0.0_wp, solid%inside(i, j, k) == 0)
+        end do
+      end do
+    end do
     if (present(merged)) call masses_of_groups(grid, solid, rho, dt, merged, self)
     do d = 1, 3
       call ordinary_links(grid, solid, mu, d, self%link(:, :, :, d))
@@ -91,27 +101,6 @@ contains
     call global_max(most)
     spread = most(1)
   end subroutine finish_diagonal
-
-  !> Mass over dt of each cell with its centre in the fluid; none of the others.
-  subroutine unknown_masses(grid, solid, rho, dt, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(in) :: dt
-    type(viscous_t), intent(inout) :: self
-    integer :: i, j, k
-
-    !$omp parallel do private(i, j) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          self%mass(i, j, k) = &
-            merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), min_mass)*grid%volume/dt, &
-                  0.0_wp, solid%inside(i, j, k) == 0)
-        end do
-      end do
-    end do
-  end subroutine unknown_masses
 
   !> The small cells' mass goes to their targets, as the lever has it (`merged_momentum_m`); those
   !! without one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
@@ -333,14 +322,27 @@ contains
     type(viscous_t), intent(inout) :: self
     integer, parameter :: sums = 11   ! K, S, M and viscosity times volume
     integer(i8) :: accumulator(accumulator_size, sums*bodies%n)
-    real(wp) :: total(sums*bodies%n)
-    integer :: b, c
+    real(wp) :: total(sums*bodies%n), term(terms_at_once, 1)
+    integer :: b, c, m, n, from, i(3)
 
     accumulator = spread(no_terms, 2, sums*bodies%n)
-    !$omp parallel private(b) if (self%walls%n > worth_threads)
+    !$omp parallel private(b, from, n, m, i, term) if (self%walls%n > worth_threads)
     do b = 1, bodies%n
       call add_moments(self%walls, b, accumulator(:, sums*b - 10:sums*b - 1))
-      call add_viscosity_times_volume(b, accumulator(:, sums*b:sums*b))
+      ! Integral of the fluid's viscosity over the own cells of the body [Pa s m3]; the threads
+      ! share the work.
+      !$omp do schedule(dynamic)
+      do from = solid%body_cell(b), solid%body_cell(b + 1) - 1, terms_at_once
+        n = 0
+        do m = from, min(from + terms_at_once, solid%body_cell(b + 1)) - 1
+          i = solid%cell(:, m)
+          if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+          n = n + 1
+          term(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+        end do
+        call exact_add_columns(term(:n, :), accumulator(:, sums*b:sums*b))
+      end do
+      !$omp end do nowait
     end do
     !$omp end parallel
     call exact_totals(accumulator, total)
@@ -351,28 +353,6 @@ contains
         self%body_matrix(c, c, b) = self%body_matrix(c, c, b) + self%spin_drag(b)
       end do
     end do
-  contains
-    !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3]; the threads share
-    !! the work.
-    subroutine add_viscosity_times_volume(body, accumulator)
-      integer, intent(in) :: body
-      integer(i8), intent(inout) :: accumulator(:, :)
-      real(wp) :: term(terms_at_once, 1)
-      integer :: m, n, from, i(3)
-
-      !$omp do schedule(dynamic)
-      do from = solid%body_cell(body), solid%body_cell(body + 1) - 1, terms_at_once
-        n = 0
-        do m = from, min(from + terms_at_once, solid%body_cell(body + 1)) - 1
-          i = solid%cell(:, m)
-          if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
-          n = n + 1
-          term(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
-        end do
-        call exact_add_columns(term(:n, :), accumulator)
-      end do
-      !$omp end do nowait
-    end subroutine add_viscosity_times_volume
   end subroutine bodies_seen_by_links
 
   !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the links of a body to their sums; the threads share

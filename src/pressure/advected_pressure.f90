@@ -72,7 +72,16 @@ contains
     way(:, :, k, :) = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      call cells_around(grid, bodies%x(:, b), far*bodies%radius(b), a, z)
+      ! Own cells that hold a ball; in a direction in which it passes the end of a period, all.
+      do d = 1, 3
+        a(d) = grid%cell_of(bodies%x(d, b) - far*bodies%radius(b), d)
+        z(d) = grid%cell_of(bodies%x(d, b) + far*bodies%radius(b), d)
+        if (.not. grid%periodic(d) .or. (a(d) >= 1 .and. z(d) <= grid%n(d))) cycle
+        a(d) = 1
+        z(d) = grid%n(d)
+      end do
+      a = max(a, grid%lo)
+      z = min(z, grid%hi)
       if (k < a(3) .or. k > z(3)) cycle
       do j = a(2), z(2)
         do i = a(1), z(1)
@@ -90,24 +99,6 @@ contains
       way(:, :, k, d) = max(-longest, min(longest, way(:, :, k, d)))
     end do
   end subroutine find_way
-
-  !> Own cells that hold a ball; in a direction in which it passes the end of a period, all.
-  pure subroutine cells_around(grid, x, radius, a, z)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: x(3), radius   !! [m]
-    integer, intent(out) :: a(3), z(3)
-    integer :: d
-
-    do d = 1, 3
-      a(d) = grid%cell_of(x(d) - radius, d)
-      z(d) = grid%cell_of(x(d) + radius, d)
-      if (.not. grid%periodic(d) .or. (a(d) >= 1 .and. z(d) <= grid%n(d))) cycle
-      a(d) = 1
-      z(d) = grid%n(d)
-    end do
-    a = max(a, grid%lo)
-    z = min(z, grid%hi)
-  end subroutine cells_around
 
   !> What the pressure in plane k changes by, `a%face(:, :, k, 1)` [Pa], to second order in the way
   !! `a%cell` [cells]; beside a cell without

@@ -206,7 +206,7 @@ contains
     real(wp), intent(in), contiguous, optional :: &
       correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]; absent: all cells have their acceleration in `flow%u`, beside gas, too
-    integer :: i, j, k, d
+    integer :: i, j, k, d, s, lower(3), upper(3), f(3)
 
     do d = 1, 3
       call interpolate(grid, dt, d, rho, a, flow)
@@ -218,13 +218,7 @@ contains
     end do
     call set_side_velocity(grid, flow%uf)
     do d = 1, 3
-      call drag_of_outflows()
-    end do
-  contains
-    !> Cells beside an outflow take half of what the face gained by the drag of the side.
-    subroutine drag_of_outflows()
-      integer :: s, lower(3), upper(3), f(3)
-
+      ! Cells beside an outflow take half of what the face gained by the drag of the side.
       do s = 1, 2
         if (.not. flow%sides(s, d)%active) cycle
         call grid%side_cells(s, d, lower, upper)
@@ -238,8 +232,8 @@ contains
           end do
         end do
       end do
-    end subroutine drag_of_outflows
-
+    end do
+  contains
     !> Sides with a given pressure: the velocity of the last cell.
     subroutine sides_of_direction()
       integer :: s, lower(3), upper(3), c(3)

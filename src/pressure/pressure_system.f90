@@ -64,7 +64,15 @@ contains
     type(pressure_system_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    call require_names(numerics)
+    ! Names of the solver and the preconditioner that nothing below handles end the program.
+    select case (numerics%pressure_solver)
+    case ('cg', 'bicgstab')
+    case default; error stop 'pressure_system_init: no such solver'
+    end select
+    select case (numerics%preconditioner)
+    case ('multigrid', 'jacobi', 'none')
+    case default; error stop 'pressure_system_init: no such preconditioner'
+    end select
     self%method = numerics%pressure_solver
     self%preconditioner = numerics%preconditioner
     a = grid%lo - 1
@@ -81,20 +89,6 @@ contains
     call elliptic_solver_init(grid, self%solver)
   end subroutine pressure_system_init
 
-  !> Names of the solver and the preconditioner that nothing below handles end the program.
-  subroutine require_names(numerics)
-    type(numerics_t), intent(in) :: numerics
-
-    select case (numerics%pressure_solver)
-    case ('cg', 'bicgstab')
-    case default; error stop 'pressure_system_init: no such solver'
-    end select
-    select case (numerics%preconditioner)
-    case ('multigrid', 'jacobi', 'none')
-    case default; error stop 'pressure_system_init: no such preconditioner'
-    end select
-  end subroutine require_names
-
   !> Coefficients of the system for the open shares and densities at hand, and of its
   !! preconditioner.
   !!
@@ -107,7 +101,7 @@ contains
       !! [kg/m3]
     type(pressure_system_t), intent(inout) :: self
     type(outflow_t), intent(in), optional :: sides(2, 3)
-    integer :: i, j, k, d, e(3)
+    integer :: i, j, k, d, e(3), s, a(3), b(3), c(3)
     real(wp) :: area_over_h
 
     do d = 1, 3
@@ -122,21 +116,7 @@ contains
           end do
         end do
       end do
-      call side_coefficients()
-    end do
-    call mark_active(grid, self%operator%cf, self%active)
-    call take_all_cells(self%solver%work)
-    call find_null_space(grid, self%operator%cf, self%solver%work)
-    select case (trim(self%preconditioner))
-    case ('multigrid'); call self%solver%multigrid%setup(self%operator%cf)
-    case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
-    case default   ! 'none' needs nothing
-    end select
-  contains
-    !> Sides of the domain: the velocity is given, or the pressure half a cell away.
-    subroutine side_coefficients()
-      integer :: s, a(3), b(3), c(3)
-
+      ! Sides of the domain: the velocity is given, or the pressure half a cell away.
       do s = 1, 2
         call grid%side_faces(s, d, a, b)
         if (.not. gives_pressure(grid%side(s, d))) then
@@ -153,7 +133,15 @@ contains
           end do
         end do
       end do
-    end subroutine side_coefficients
+    end do
+    call mark_active(grid, self%operator%cf, self%active)
+    call take_all_cells(self%solver%work)
+    call find_null_space(grid, self%operator%cf, self%solver%work)
+    select case (trim(self%preconditioner))
+    case ('multigrid'); call self%solver%multigrid%setup(self%operator%cf)
+    case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
+    case default   ! 'none' needs nothing
+    end select
   end subroutine set_pressure_system
 
   !> Own cells that have a face through which fluid can move.

@@ -213,9 +213,25 @@ contains
     class(multigrid_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: cf(self%lo(1) - 1:, self%lo(2) - 1:, self%lo(3) - 1:, :)
     real(wp) :: largest(1)
-    integer :: l
+    integer :: l, i, j, k, d, e(3)
 
-    largest = largest_coefficient(self%lo, self%hi, cf)
+    ! Largest coefficient of the own faces.
+    largest = 0.0_wp
+    !$omp parallel do private(i, j, d, e) reduction(max: largest) schedule(static) &
+    !$omp if (size(cf) > 3*worth_threads)
+    do k = self%lo(3), self%hi(3) + 1
+      do d = 1, 3
+        e = 0
+        e(d) = 1
+        if (k > self%hi(3) + e(3)) cycle
+        do j = self%lo(2), self%hi(2) + e(2)
+          !$omp simd reduction(max: largest)
+          do i = self%lo(1), self%hi(1) + e(1)
+            largest = max(largest, cf(i, j, k, d))
+          end do
+        end do
+      end do
+    end do
     call global_max(largest)
     self%unit_exponent = exponent(largest(1))
     if (gathers(self, 1)) then
@@ -244,31 +260,6 @@ contains
       end if
     end subroutine set_level
   end subroutine setup_levels
-
-  !> Largest coefficient of the own faces.
-  function largest_coefficient(lo, hi, cf) result(largest)
-    integer, intent(in) :: lo(3), hi(3)
-    real(wp), intent(in), contiguous :: cf(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
-    real(wp) :: largest
-    integer :: i, j, k, d, e(3)
-
-    largest = 0.0_wp
-    !$omp parallel do private(i, j, d, e) reduction(max: largest) schedule(static) &
-    !$omp if (size(cf) > 3*worth_threads)
-    do k = lo(3), hi(3) + 1
-      do d = 1, 3
-        e = 0
-        e(d) = 1
-        if (k > hi(3) + e(3)) cycle
-        do j = lo(2), hi(2) + e(2)
-          !$omp simd reduction(max: largest)
-          do i = lo(1), hi(1) + e(1)
-            largest = max(largest, cf(i, j, k, d))
-          end do
-        end do
-      end do
-    end do
-  end function largest_coefficient
 
   !> Put the coefficients of the blocks of all processes together.
   subroutine gather_coefficients(lo, hi, part, level)
@@ -377,7 +368,15 @@ contains
     direct = l == 1 .and. .not. gathers(self, 1)
     n = self%level(l)%hi(1) - self%level(l)%lo(1) + 1
     line(n + 1:) = 0.0_sp
-    if (gathers(self, l)) call gather_right_side(self, crew, l, factor, r)
+    ! Put the right side of level l together from the blocks of all processes.
+    if (gathers(self, l)) then
+      if (crew%me == 0) then
+        if (l == 1) self%part = real(factor*r(self%lo(1):self%hi(1), self%lo(2):self%hi(2), &
+                                              self%lo(3):self%hi(3)), sp)
+        call gather_all(self%part, self%part_lo, self%part_hi, self%level(l)%f)
+      end if
+      call wait(crew)
+    end if
     associate (level => self%level(l))
       call my_planes(crew, level%lo(3), level%hi(3), first, last)
       do k = first, last
@@ -393,22 +392,6 @@ contains
       call finish_sweep(level, crew)
     end associate
   end subroutine load
-
-  !> Put the right side of level l together from the blocks of all processes.
-  subroutine gather_right_side(self, crew, l, factor, r)
-    class(multigrid_t), intent(inout) :: self
-    type(team_t), intent(in) :: crew
-    integer, intent(in) :: l
-    real(wp), intent(in) :: factor
-    real(wp), intent(in), contiguous :: r(self%lo(1) - 1:, self%lo(2) - 1:, self%lo(3) - 1:)
-
-    if (crew%me == 0) then
-      if (l == 1) self%part = real(factor*r(self%lo(1):self%hi(1), self%lo(2):self%hi(2), &
-        self%lo(3):self%hi(3)), sp)
-      call gather_all(self%part, self%part_lo, self%part_hi, self%level(l)%f)
-    end if
-    call wait(crew)
-  end subroutine gather_right_side
 
   !> Correction that level l has found: into the unknown z, or for the finer level.
   subroutine unload(self, crew, l, factor, z)
@@ -455,33 +438,21 @@ contains
     type(level_t), intent(inout) :: level
     type(team_t), intent(in) :: crew
     integer, intent(in) :: colours(:)
-    integer :: first, last
+    integer :: first, last, s, k, front, low, high
 
     call my_planes(crew, level%lo(3), level%hi(3), first, last)
     if (any(level%talks) .or. (level%hi(3) - level%lo(3) + 1)/crew%n < 2*size(colours)) then
-      call smooth_by_sweeps()
-    else
-      call smooth_by_waves()
-    end if
-  contains
-    !> One colour after the other.
-    subroutine smooth_by_sweeps()
-      integer :: s, k
-
+      ! One colour after the other.
       do s = 1, size(colours)
         do k = first, last
           call relax_plane(level, colours(s), k)
         end do
         call finish_sweep(level, crew)
       end do
-    end subroutine smooth_by_sweeps
-
-    !> All colours in one go through the planes, each one plane behind the one before, while the
-    !! planes are still near the processor. At planes of other threads each half sweep stops one
-    !! plane earlier; the wedge left open there is filled by the thread above it.
-    subroutine smooth_by_waves()
-      integer :: s, k, front, low, high
-
+    else
+      ! All colours in one go through the planes, each one plane behind the one before, while the
+      ! planes are still near the processor. At planes of other threads each half sweep stops one
+      ! plane earlier; the wedge left open there is filled by the thread above it.
       low = merge(1, 0, first > level%lo(3))
       high = merge(1, 0, last < level%hi(3))
       do front = first, last + size(colours) - 1
@@ -498,7 +469,7 @@ contains
         end do
       end do
       call wait(crew)
-    end subroutine smooth_by_waves
+    end if
   end subroutine smooth
 
   !> Right side of the next level from the residual of level l.

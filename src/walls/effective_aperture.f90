@@ -35,10 +35,18 @@ contains
     type(solid_geometry_t), intent(inout) :: solid
     real(wp) :: more(3, solid%n_cut)   ! m - 1 of the cut cells
     integer :: owner(solid%n_cut)      ! the body that cuts them, or `several`
-    integer :: k, m
+    integer :: k, m, b
 
     call ensure_capacity(solid%n_cut, solid%edge)
-    call find_owners(solid, owner)
+    ! The body that cuts each cut cell, or `several`.
+    owner = 0
+    do b = 1, size(solid%body_cell) - 1
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        associate (cut => solid%cut(solid%cell(1, m), solid%cell(2, m), solid%cell(3, m)))
+          if (cut > 0) owner(cut) = merge(b, several, owner(cut) == 0 .or. owner(cut) == b)
+        end associate
+      end do
+    end do
     !$omp parallel
     !$omp do schedule(static)
     do k = grid%first(3), grid%last(3)
@@ -148,22 +156,6 @@ contains
       end associate
     end subroutine narrow
   end subroutine narrow_faces
-
-  !> The body that cuts each cut cell, or `several`.
-  subroutine find_owners(solid, owner)
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(out) :: owner(:)   !! (cut cells)
-    integer :: b, m
-
-    owner = 0
-    do b = 1, size(solid%body_cell) - 1
-      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        associate (cut => solid%cut(solid%cell(1, m), solid%cell(2, m), solid%cell(3, m)))
-          if (cut > 0) owner(cut) = merge(b, several, owner(cut) == 0 .or. owner(cut) == b)
-        end associate
-      end do
-    end do
-  end subroutine find_owners
 
   !> Is another body than b, the owner of cell c, in this cell or one of the 26 around? There the
   !! water beyond an edge is in a gap, not open.

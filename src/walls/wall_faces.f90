@@ -122,21 +122,14 @@ contains
           total = total + seen_from(f, -1, solid%link_length(2, m), solid%link_body(2, m), f, d)
         end if
         if (sides == 0) return
-        plane = behind_plane(low, f, d)
+        ! Is what lies behind face f a plane wall, 1, or an edge that the stream passes straight, 0?
+        plane = 1.0_wp
+        if (solid%aperture(f(1), f(2), f(3), d) >= 1.0_wp) then
+          plane = 1.0_wp - max(edge_in(solid, low), edge_in(solid, f))
+        end if
         flow%uf(i, j, k, d) = (1.0_wp - plane)*flow%uf(i, j, k, d) + plane*(total/real(sides, wp))
       end associate
     end subroutine set_face
-
-    !> Is what lies behind face f a plane wall, 1, or an edge that the stream passes straight, 0?
-    pure function behind_plane(low, f, d) result(share)
-      integer, intent(in) :: low(3), f(3), d
-      real(wp) :: share
-
-      share = 1.0_wp
-      if (solid%aperture(f(1), f(2), f(3), d) >= 1.0_wp) then
-        share = 1.0_wp - max(edge_in(solid, low), edge_in(solid, f))
-      end if
-    end function behind_plane
 
     !> Velocity of face f as seen from cell c, whose link along +d or -d ends at theta cells.
     pure function seen_from(c, sense, theta, body, f, d) result(velocity)
@@ -144,7 +137,7 @@ contains
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: velocity
       integer :: o(3)
-      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), r, along, gain
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), r, along, gain, time
 
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
@@ -154,8 +147,12 @@ contains
       u = flow%u(c(1), c(2), c(3), :)
       if (a%in_liquid(c(1), c(2), c(3))) then
         wall = wall_velocity(predicted%motion(:, body), arm)
-        gain = time_in_liquid(c, sum(abs(u - wall)/grid%h)) &
-               *(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
+        ! Time for which the Rhie-Chow acceleration at a wall counts in liquid [s].
+        time = dt
+        if (.not. c_ismac) time = rhie_chow_time(dt, dt*sum(abs(u - wall)/grid%h))
+        time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), &
+                         sum(1.0_wp/grid%h**2))
+        gain = time*(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
       else
         wall = wall_velocity(at_start%motion(:, body), arm)
         gain = dt*a%face(f(1), f(2), f(3), d)
@@ -169,46 +166,28 @@ contains
       velocity = u(d) + gain
     end function seen_from
 
-    !> Time for which the Rhie-Chow acceleration at a wall counts in liquid [s].
-    pure function time_in_liquid(c, rate) result(time)
-      integer, intent(in) :: c(3)
-      real(wp), intent(in) :: rate   !! Courant number per second of the flow past the wall [1/s]
-      real(wp) :: time
-
-      time = dt
-      if (.not. c_ismac) time = rhie_chow_time(dt, dt*rate)
-      time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
-    end function time_in_liquid
-
     !> r of the middle of the open part of the face: 0 at the wall, 1 as far as the centre of the
     !! cell.
     pure function middle_of_face(theta, n, d, aperture) result(r)
       real(wp), intent(in) :: theta, n(3), aperture   !! link [cells], normal, open share
       integer, intent(in) :: d                    !! direction of the link
       real(wp) :: r
-      real(wp) :: cell, face   !! distances from the wall [spacings along the link]
+      real(wp) :: ratio, cell, face   !! distances from the wall [spacings along the link]
+      integer :: a, b
 
       cell = theta*abs(n(d))
       if (aperture >= 1.0_wp) then
         face = (theta - 0.5_wp)*abs(n(d))
       else
-        face = 0.5_wp*aperture*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
+        ! Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
+        a = 1 + mod(d, 3)
+        b = 1 + mod(d + 1, 3)
+        ratio = sqrt(max((n(a)*(grid%h(a)/grid%h(d)))**2 + (n(b)*(grid%h(b)/grid%h(d)))**2, &
+                         tiny(1.0_wp))/max(n(a)**2 + n(b)**2, tiny(1.0_wp)))
+        face = 0.5_wp*aperture*ratio*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
       end if
       r = max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
     end function middle_of_face
-
-    !> Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
-    pure function spacing_across(n, d) result(ratio)
-      real(wp), intent(in) :: n(3)   !! normal of the wall
-      integer, intent(in) :: d
-      real(wp) :: ratio
-      integer :: a, b
-
-      a = 1 + mod(d, 3)
-      b = 1 + mod(d + 1, 3)
-      ratio = sqrt(max((n(a)*(grid%h(a)/grid%h(d)))**2 + (n(b)*(grid%h(b)/grid%h(d)))**2, &
-                       tiny(1.0_wp))/max(n(a)**2 + n(b)**2, tiny(1.0_wp)))
-    end function spacing_across
   end subroutine face_velocity_at_walls
 
 end module wall_faces_m
