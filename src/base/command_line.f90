@@ -77,7 +77,15 @@ contains
       i = i + 1
       word = arguments(i)%text
       if (index(word, '-') /= 1 .or. word == '-') then
-        call take_file(word, options, problems)
+        ! A word that is not an option: the case file.
+        if (len(options%case_file) > 0) then
+          call problems%add_message("two case files given, '"//options%case_file &
+            //"' and '"//word//"'")
+        else if (len(word) == 0) then
+          call problems%add_message('the name of the case file is empty')
+        else if (word /= '-') then
+          options%case_file = word
+        end if
         cycle
       end if
       equals = index(word, '=')
@@ -108,21 +116,6 @@ contains
     case default; wants_value = .false.
     end select
   end function wants_value
-
-  !> A word that is not an option: the case file.
-  subroutine take_file(word, options, problems)
-    character(*), intent(in) :: word
-    type(options_t), intent(inout) :: options
-    type(problems_t), intent(inout) :: problems
-
-    if (len(options%case_file) > 0) then
-      call problems%add_message("two case files given, '"//options%case_file//"' and '"//word//"'")
-    else if (len(word) == 0) then
-      call problems%add_message('the name of the case file is empty')
-    else if (word /= '-') then
-      options%case_file = word
-    end if
-  end subroutine take_file
 
   !> One option with its value, if it has one.
   subroutine take_option(word, has_value, value, options, problems)

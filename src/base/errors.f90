@@ -153,24 +153,19 @@ contains
     integer, intent(in) :: code
     character(*), intent(in) :: message
     real(wp), parameter :: timeout = 1.0_wp   !! time for the root to end the others [s]
-
-    if (.not. is_root()) call parallel_pause(timeout)
-    if (len(message) > 0) write (error_unit, '(a)') 'mics: '//lines_of(message)
-    flush (error_unit)
-    call parallel_abort(code)
-  end subroutine fatal
-
-  !> A message without control characters, apart from the ends of its lines.
-  pure function lines_of(message) result(text)
-    character(*), intent(in) :: message
     character(len(message)) :: text
     integer :: i
 
+    if (.not. is_root()) call parallel_pause(timeout)
+    ! A message without control characters, apart from the ends of its lines.
     text = sanitise(message)
     do i = 1, len(message)
       if (message(i:i) == new_line('a')) text(i:i) = new_line('a')
     end do
-  end function lines_of
+    if (len(message) > 0) write (error_unit, '(a)') 'mics: '//text
+    flush (error_unit)
+    call parallel_abort(code)
+  end subroutine fatal
 
   !> An integer without blanks.
   pure function integer_text(value) result(text)

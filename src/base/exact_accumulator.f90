@@ -39,32 +39,11 @@ contains
     real(wp), intent(in), contiguous :: p(:)   !! at most `chunk_size` terms
     integer(i8), intent(inout) :: accumulator(accumulator_size)
     integer(i8) :: part(accumulator_size)
-    real(wp) :: total(3)
-    integer :: top, b
+    real(wp) :: total(3), largest, m1, m2, m3, m4
+    integer :: top, b, i, q
 
     part = 0_i8
-    top = top_bin(largest_term(p))
-    if (top < not_a_number) then
-      call split_terms(p, top, total)
-      if (abs(total(1)) <= huge(total)) then
-        do b = 1, 3
-          part(1 + b) = int(scale(total(b), -bin_digits*(top + 1 - b)), i8)
-        end do
-      else
-        top = not_a_number
-      end if
-    end if
-    part(1) = int(top, i8)
-    call merge_accumulators(part, accumulator)
-  end subroutine add_terms
-
-  !> Largest magnitude of the terms; four at a time, for a maximum waits for the one before.
-  pure function largest_term(p) result(largest)
-    real(wp), intent(in), contiguous :: p(:)
-    real(wp) :: largest
-    real(wp) :: m1, m2, m3, m4
-    integer :: i, q
-
+    ! Largest magnitude of the terms; four at a time, for a maximum waits for the one before.
     q = size(p)/4
     m1 = 0.0_wp
     m2 = 0.0_wp
@@ -81,7 +60,20 @@ contains
     do i = 4*q + 1, size(p)
       largest = max(largest, abs(p(i)))
     end do
-  end function largest_term
+    top = top_bin(largest)
+    if (top < not_a_number) then
+      call split_terms(p, top, total)
+      if (abs(total(1)) <= huge(total)) then
+        do b = 1, 3
+          part(1 + b) = int(scale(total(b), -bin_digits*(top + 1 - b)), i8)
+        end do
+      else
+        top = not_a_number
+      end if
+    end if
+    part(1) = int(top, i8)
+    call merge_accumulators(part, accumulator)
+  end subroutine add_terms
 
   !> Index of the highest bin that terms up to `largest` reach.
   pure function top_bin(largest) result(top)

@@ -15,7 +15,7 @@ contains
   function available_memory() result(bytes)
     integer(i8) :: bytes
 
-    bytes = free_memory()
+    bytes = 1024*kilobytes_in('/proc/meminfo', 'MemAvailable:')
     if (bytes > 0) bytes = min(bytes, group_limit())
   end function available_memory
 
@@ -45,13 +45,6 @@ contains
     read (row, *, iostat=status) found   ! `unlimited` is no number
     if (status == 0) bytes = found
   end function address_limit
-
-  !> What the machine could give without pushing other programs out [B]; 0: unknown.
-  function free_memory() result(bytes)
-    integer(i8) :: bytes
-
-    bytes = 1024*kilobytes_in('/proc/meminfo', 'MemAvailable:')
-  end function free_memory
 
   !> The number after a name at the beginning of a row of a file; 0 if there is none.
   function kilobytes_in(file, name) result(kilobytes)

@@ -209,7 +209,7 @@ contains
   pure subroutine cut_at_heights(p, s)
     type(polyhedron_t), intent(inout) :: p
     real(wp), intent(in) :: s(max_corners)   !! height of each corner above the plane [any]
-    integer :: v, w, slot, n_old, n_new
+    integer :: v, w, slot, n_old, n_new, start, here, from, to, step
 
     n_old = p%n
     n_new = n_old
@@ -229,19 +229,9 @@ contains
       return
     end if
     p%n = n_new
-    call close_cut(p, n_old)
-    call drop_corners(p, n_old, s)
-  end subroutine cut_at_heights
-
-  !> Join the new corners (numbers above n_old) along the faces they cut.
-  !!
-  !! From a new corner, walk its face through the part that stays up to the other new corner of that
-  !! face: the new edge leads back from there.
-  pure subroutine close_cut(p, n_old)
-    type(polyhedron_t), intent(inout) :: p
-    integer, intent(in) :: n_old
-    integer :: start, here, from, to, step
-
+    ! Join the new corners (numbers above n_old) along the faces they cut. From a new corner, walk
+    ! its face through the part that stays up to the other new corner of that face: the new edge
+    ! leads back from there.
     do start = n_old + 1, p%n
       from = start
       here = p%adjacent(1, start)
@@ -254,7 +244,8 @@ contains
       p%adjacent(2, start) = here
       p%adjacent(3, here) = start
     end do
-  end subroutine close_cut
+    call drop_corners(p, n_old, s)
+  end subroutine cut_at_heights
 
   !> Slot of a neighbour in the list of a corner.
   pure function slot_of(adjacent, neighbour) result(slot)
@@ -368,20 +359,13 @@ contains
     real(wp), intent(out) :: volume, moment(3)   !! [m3], [m4]
     type(polyhedron_t) :: part
 
-    call copy_polyhedron(p, part)
+    ! Copy the corners in use only.
+    part%n = p%n
+    part%x(:, 1:p%n) = p%x(:, 1:p%n)
+    part%adjacent(:, 1:p%n) = p%adjacent(:, 1:p%n)
     call cut_polyhedron(part, n, d)
     call polyhedron_moments(part, volume, moment)
   end subroutine polyhedron_moments_below
-
-  !> Copy the corners in use only.
-  pure subroutine copy_polyhedron(from, to)
-    type(polyhedron_t), intent(in) :: from
-    type(polyhedron_t), intent(out) :: to
-
-    to%n = from%n
-    to%x(:, 1:from%n) = from%x(:, 1:from%n)
-    to%adjacent(:, 1:from%n) = from%adjacent(:, 1:from%n)
-  end subroutine copy_polyhedron
 
   !> The part of a tetrahedron in a box; cut it again by planes with `polyhedron_moments_below`.
   pure subroutine clip_tet_to_box(corner, lo, hi, p)

@@ -216,9 +216,9 @@ contains
     type(bed_t), intent(inout) :: bed
     type(bins_t) :: bins
     integer, allocatable :: number(:)
-    real(wp), allocatable :: low(:, :), high(:, :)
+    real(wp), allocatable :: low(:, :), high(:, :), point(:, :)
     real(wp) :: near
-    integer :: i, m, n, bin, p
+    integer :: i, m, n, bin, p, c(3)
 
     near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
     low = near_tank(case, bed%point - near)
@@ -240,16 +240,7 @@ contains
       n = n + 1
       number(i) = n
     end do
-    call renumber(number, n, bed)
-  end subroutine join_points
-
-  !> Take new numbers of the points.
-  subroutine renumber(number, n, bed)
-    integer, intent(in) :: number(:), n
-    type(bed_t), intent(inout) :: bed
-    real(wp) :: point(3, n)
-    integer :: i, m, c(3)
-
+    allocate (point(3, n))
     do i = size(number), 1, -1   ! of equal points the first one stays
       point(:, number(i)) = bed%point(:, i)
     end do
@@ -262,7 +253,7 @@ contains
     end do
     bed%point = point
     bed%triangle = bed%triangle(:, :m)
-  end subroutine renumber
+  end subroutine join_points
 
   !> Points far from the tank moved to it: bins of the places beside it stay small where a bed has
   !! points far away. Order along each axis is kept, so bins still find all they should.

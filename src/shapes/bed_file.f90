@@ -81,7 +81,8 @@ contains
     real(wp) :: first(2), spacing(2)
     integer :: n(2), i, j, k
 
-    if (index(words%text, achar(0)) > 0 .or. starts_as_stl(words%text)) then
+    if (index(words%text, achar(0)) > 0 &
+        .or. lower_case(words%text(:min(5, len(words%text)))) == 'solid') then
       words%line = 0
       call report(words, 'looks like an STL or another binary file, not a map of heights; ' &
         //'an STL file is read with kind = ''stl''')
@@ -124,14 +125,6 @@ contains
     end do
   end subroutine read_heights
 
-  !> Does a text begin with the first keyword of an ASCII STL file?
-  pure function starts_as_stl(text) result(yes)
-    character(*), intent(in) :: text
-    logical :: yes
-
-    yes = lower_case(text(:min(5, len(text)))) == 'solid'
-  end function starts_as_stl
-
   !> A height; the numbers that maps of measured ground write where there is none are asked about.
   subroutine get_height(words, z)
     type(words_t), intent(inout) :: words
@@ -149,7 +142,7 @@ contains
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(inout) :: form
     character(:), allocatable :: word
-    integer :: n, k, in_facet
+    integer :: n, k, in_facet, c
     logical :: open_facet
 
     word = next_word(words)
@@ -178,7 +171,10 @@ contains
         if (.not. open_facet) call report(words, 'a vertex stands outside of a facet')
         in_facet = in_facet + 1
         n = n + 1
-        call read_corner(words, n, form)
+        call ensure_capacity(n, form%point)
+        do c = 1, 3
+          call get_real(words, form%point(c, n))
+        end do
       case ('endfacet')
         if (.not. open_facet .or. in_facet /= 3) then
           call report(words, 'a facet of the file does not have three corners')
@@ -195,19 +191,6 @@ contains
     form%triangle = reshape([(k, k=1, n)], [3, n/3])
   end subroutine read_ascii_stl
 
-  !> The three coordinates of corner n, at the end of the list.
-  subroutine read_corner(words, n, form)
-    type(words_t), intent(inout) :: words
-    integer, intent(in) :: n
-    type(bed_form_t), intent(inout) :: form
-    integer :: c
-
-    call ensure_capacity(n, form%point)
-    do c = 1, 3
-      call get_real(words, form%point(c, n))
-    end do
-  end subroutine read_corner
-
   !> Has a text the length of a binary STL file, or less than a facet more, as some writers leave
   !! there? Some of those begin with `solid` too. Four letters in the place of the number would
   !! announce more facets than a file can hold.
@@ -215,24 +198,19 @@ contains
     character(*), intent(in) :: text
     logical :: yes
     real(wp) :: more   ! bytes behind the facets announced
-
-    yes = len(text) >= stl_head
-    if (.not. yes) return
-    more = real(len(text) - stl_head, wp) - stl_facet*facets_announced(text)
-    yes = more > -0.5_wp .and. more < stl_facet - 0.5_wp
-  end function is_binary_stl
-
-  !> Number of facets in the head of a binary STL file, lowest byte first.
-  pure function facets_announced(text) result(n)
-    character(*), intent(in) :: text
     real(wp) :: n
     integer :: c
 
+    yes = len(text) >= stl_head
+    if (.not. yes) return
+    ! Number of facets in the head of a binary STL file, lowest byte first.
     n = 0.0_wp
     do c = stl_head, stl_head - 3, -1
       n = 256.0_wp*n + real(ichar(text(c:c)), wp)
     end do
-  end function facets_announced
+    more = real(len(text) - stl_head, wp) - stl_facet*n
+    yes = more > -0.5_wp .and. more < stl_facet - 0.5_wp
+  end function is_binary_stl
 
   !> Head, number of facets, then normal, three corners and two bytes for each.
   subroutine read_binary_stl(words, form)

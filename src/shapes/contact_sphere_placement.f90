@@ -26,7 +26,8 @@ contains
     do m = 1, size(tet)
       x = shape%point(:, shape%tet(:, tet(m)))
       shape%sphere_centre(:, m) = sum(x, 2)/4.0_wp
-      shape%sphere_radius(m) = sphere_of_volume(tet_volume(x))
+      ! the sphere has the volume of the tetrahedron
+      shape%sphere_radius(m) = (0.75_wp*tet_volume(x)/pi)**(1.0_wp/3.0_wp)
     end do
   end subroutine place_at_centroids
 
@@ -97,13 +98,5 @@ contains
       highest = max(highest, error)
     end do
   end subroutine height_errors
-
-  !> Radius of the sphere with a given volume [m].
-  pure function sphere_of_volume(volume) result(radius)
-    real(wp), intent(in) :: volume   !! [m3]
-    real(wp) :: radius
-
-    radius = (0.75_wp*volume/pi)**(1.0_wp/3.0_wp)
-  end function sphere_of_volume
 
 end module contact_sphere_placement_m

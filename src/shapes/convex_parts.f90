@@ -143,6 +143,7 @@ contains
     integer, allocatable, intent(out) :: tet(:, :)   !! (4, n) positive volume
     integer, allocatable :: coarse(:, :)
     integer :: centre, f, k, m, p, n, lowest, start
+    real(wp) :: middle(3)
 
     allocate (coarse(4, size(parts%corner)))
     n = 0
@@ -152,7 +153,11 @@ contains
         associate (c => parts%corner(parts%first(f):parts%first(f + 1) - 1))
           m = size(c)
           if (from_middle .and. m > 4) then
-            call find_or_add(middle_of(points%x(:, c)), points, start)
+            ! Mean of the corners of a face, the same bits whatever corner comes first.
+            middle = 0.5_wp*(minval(points%x(:, c), 2) + maxval(points%x(:, c), 2))
+            middle = middle + sum(points%x(:, c) - spread(middle, 2, size(points%x(:, c), 2)), &
+                                  2)/real(size(points%x(:, c), 2), wp)
+            call find_or_add(middle, points, start)
             lowest = 1
           else
             lowest = minloc(c, 1)
@@ -169,15 +174,6 @@ contains
     call cut_tets(coarse(:, :n), fine, points, tet)
   end subroutine tets_of_parts
 
-  !> Mean of the corners of a face, the same bits whatever corner comes first.
-  pure function middle_of(x) result(middle)
-    real(wp), intent(in) :: x(:, :)   !! (3, corners)
-    real(wp) :: middle(3)
-
-    middle = 0.5_wp*(minval(x, 2) + maxval(x, 2))
-    middle = middle + sum(x - spread(middle, 2, size(x, 2)), 2)/real(size(x, 2), wp)
-  end function middle_of
-
   !> Cut every tetrahedron into `fine`**3 parts of equal volume, fitting across faces.
   !!
   !! With its corners in ascending order a tetrahedron is mapped to the set
@@ -190,7 +186,7 @@ contains
     integer, parameter :: order(3, 6) = reshape([1, 2, 3, 1, 3, 2, 2, 1, 3, 2, 3, 1, 3, 1, 2, &
                                                  3, 2, 1], [3, 6])
     integer, allocatable :: head(:), next(:)   ! points by their hash
-    integer :: corner(4), number(0:fine, 0:fine, 0:fine), step(3, 4), t, i, j, k, m, v, n
+    integer :: corner(4), number(0:fine, 0:fine, 0:fine), step(3, 4), t, i, j, k, m, v, n, rest(4)
 
     if (fine == 1) then
       tet = coarse
@@ -208,7 +204,11 @@ contains
     end do
     n = 0
     do t = 1, size(coarse, 2)
-      corner = ascending(coarse(:, t))
+      rest = coarse(:, t)
+      do i = 1, 4
+        corner(i) = minval(rest)
+        rest(minloc(rest, 1)) = huge(1)
+      end do
       do k = 0, fine
         do j = k, fine
           do i = j, fine
@@ -246,17 +246,6 @@ contains
 
     if (tet_volume(points%x(:, tet)) < 0.0_wp) tet(1:2) = tet([2, 1])
   end subroutine make_positive
-
-  pure function ascending(a) result(b)
-    integer, intent(in) :: a(4)
-    integer :: b(4), rest(4), i
-
-    rest = a
-    do i = 1, 4
-      b(i) = minval(rest)
-      rest(minloc(rest, 1)) = huge(1)
-    end do
-  end function ascending
 
   !> Number of the point with the given weights of four corners, added if it is new. Neighbours
   !! find the same bits because their corners come in the same order.

@@ -38,10 +38,26 @@ contains
     type(shape_t), intent(inout) :: shape
     type(facets_t) :: facets
     real(wp), allocatable :: ball(:, :)   ! (4, *) centre and radius
-    real(wp) :: polygon(3, max_clip_corners), p(3), side(3)
+    real(wp) :: polygon(3, max_clip_corners), p(3), side(3), normal(3)
     integer :: n, n_ball, m, ring, c, k, parts
 
-    call load_facets(shape, facets)
+    facets%n = size(shape%facet) - 1
+    facets%corners = shape%facet(2:) - shape%facet(:facets%n)
+    allocate (facets%x(3, maxval(facets%corners), facets%n), facets%normal(3, facets%n))
+    allocate (facets%middle(3, facets%n), facets%bounding_radius(facets%n))
+    do m = 1, facets%n
+      n = facets%corners(m)
+      facets%x(:, :n, m) = shape%point(:, shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
+      associate (x => facets%x(:, :n, m))
+        facets%middle(:, m) = sum(x, 2)/real(n, wp)
+        facets%bounding_radius(m) = maxval(norm2(x - spread(facets%middle(:, m), 2, n), 1))
+        normal = 0.0_wp
+        do k = 2, n - 1
+          normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))
+        end do
+        facets%normal(:, m) = normal/norm(normal)
+      end associate
+    end do
     allocate (ball(4, 64))
     n_ball = 0
     do m = 1, facets%n
@@ -65,31 +81,6 @@ contains
     shape%sphere_centre = ball(1:3, :n_ball)
     shape%sphere_radius = ball(4, :n_ball)
   end subroutine place_densely
-
-  pure subroutine load_facets(shape, facets)
-    type(shape_t), intent(in) :: shape
-    type(facets_t), intent(out) :: facets
-    real(wp) :: normal(3)
-    integer :: m, k, n
-
-    facets%n = size(shape%facet) - 1
-    facets%corners = shape%facet(2:) - shape%facet(:facets%n)
-    allocate (facets%x(3, maxval(facets%corners), facets%n), facets%normal(3, facets%n))
-    allocate (facets%middle(3, facets%n), facets%bounding_radius(facets%n))
-    do m = 1, facets%n
-      n = facets%corners(m)
-      facets%x(:, :n, m) = shape%point(:, shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
-      associate (x => facets%x(:, :n, m))
-        facets%middle(:, m) = sum(x, 2)/real(n, wp)
-        facets%bounding_radius(m) = maxval(norm2(x - spread(facets%middle(:, m), 2, n), 1))
-        normal = 0.0_wp
-        do k = 2, n - 1
-          normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))
-        end do
-        facets%normal(:, m) = normal/norm(normal)
-      end associate
-    end do
-  end subroutine load_facets
 
   !> The part of a convex polygon farther than `distance` from each of its sides; n < 3 if none.
   pure subroutine inset(x, normal, distance, part, n)

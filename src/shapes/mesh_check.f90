@@ -22,7 +22,8 @@ contains
     integer, allocatable, intent(inout) :: tet(:, :)      !! (4, m)
     character(:), allocatable, intent(out) :: message
     integer, allocatable :: triangle(:, :), triangle_tet(:)
-    integer :: n
+    integer :: n, i, a, b
+    real(wp) :: x(3, 4), v, longest
 
     message = ''
     if (size(tet, 2) == 0) then
@@ -30,7 +31,20 @@ contains
       return
     end if
     call drop_unused(point, tet)
-    call turn_and_count_flat(point, tet, n)
+    ! Give every tetrahedron a positive volume; the number of those without one worth the name.
+    n = 0
+    do i = 1, size(tet, 2)
+      x = point(:, tet(:, i))
+      v = tet_volume(x)
+      longest = 0.0_wp
+      do a = 1, 3
+        do b = a + 1, 4
+          longest = max(longest, norm2(x(:, a) - x(:, b)))
+        end do
+      end do
+      if (abs(v) <= flat_tet*longest**3) n = n + 1
+      if (v < 0.0_wp) tet(1:2, i) = tet([2, 1], i)
+    end do
     if (n > 0) call add(to_text(n)//' tetrahedra are flat')
     n = coinciding(point)
     if (n > 0) call add(to_text(n)//' points stand in the place of another, join them')
@@ -76,29 +90,6 @@ contains
       end do
     end do
   end subroutine drop_unused
-
-  !> Give every tetrahedron a positive volume; the number of those without one worth the name.
-  pure subroutine turn_and_count_flat(point, tet, n)
-    real(wp), intent(in) :: point(:, :)
-    integer, intent(inout) :: tet(:, :)
-    integer, intent(out) :: n
-    real(wp) :: x(3, 4), v, longest
-    integer :: i, a, b
-
-    n = 0
-    do i = 1, size(tet, 2)
-      x = point(:, tet(:, i))
-      v = tet_volume(x)
-      longest = 0.0_wp
-      do a = 1, 3
-        do b = a + 1, 4
-          longest = max(longest, norm2(x(:, a) - x(:, b)))
-        end do
-      end do
-      if (abs(v) <= flat_tet*longest**3) n = n + 1
-      if (v < 0.0_wp) tet(1:2, i) = tet([2, 1], i)
-    end do
-  end subroutine turn_and_count_flat
 
   !> Points with another of lower number in the same place.
   function coinciding(point) result(n)

@@ -194,7 +194,20 @@ contains
         end do
       end do
     end do
-    call sort_neighbours(begin, pairs)
+    ! Sort the pairs from `begin` on, all of one body, by counterpart.
+    do i = begin + 1, pairs%n
+      b = pairs%b(i)
+      shift = pairs%shift(:, i)
+      j = i - 1
+      do while (j >= begin)
+        if (pairs%b(j) < b) exit
+        pairs%b(j + 1) = pairs%b(j)
+        pairs%shift(:, j + 1) = pairs%shift(:, j)
+        j = j - 1
+      end do
+      pairs%b(j + 1) = b
+      pairs%shift(:, j + 1) = shift
+    end do
   end subroutine add_neighbours
 
   !> What to add to the distance d so that it points to the nearest periodic image [m].
@@ -269,27 +282,5 @@ contains
     pairs%b(pairs%n) = b
     pairs%shift(:, pairs%n) = shift
   end subroutine add_pair
-
-  !> Sort the pairs from `begin` on, all of one body, by counterpart.
-  pure subroutine sort_neighbours(begin, pairs)
-    integer, intent(in) :: begin
-    type(pair_list_t), intent(inout) :: pairs
-    integer :: i, j, b
-    real(wp) :: shift(3)
-
-    do i = begin + 1, pairs%n
-      b = pairs%b(i)
-      shift = pairs%shift(:, i)
-      j = i - 1
-      do while (j >= begin)
-        if (pairs%b(j) < b) exit
-        pairs%b(j + 1) = pairs%b(j)
-        pairs%shift(:, j + 1) = pairs%shift(:, j)
-        j = j - 1
-      end do
-      pairs%b(j + 1) = b
-      pairs%shift(:, j + 1) = shift
-    end do
-  end subroutine sort_neighbours
 
 end module neighbours_m

@@ -108,14 +108,20 @@ contains
     type(polyhedron_t), intent(out) :: stone
     type(polyhedron_t) :: form
     real(wp) :: normal(3, n_planes), weight(n_planes), edge, longest, width
-    integer :: try
+    integer :: try, v, k
 
     longest = -1.0_wp
     do try = 1, max_tries
       call draw_planes(input, try, normal, weight)
       call cut_to_blockiness(input%blockiness, normal, weight, form)
       if (form%n == 0) cycle
-      edge = shortest_edge(form)
+      ! Length of the shortest edge.
+      edge = huge(edge)
+      do v = 1, form%n
+        do k = 1, 3
+          edge = min(edge, norm2(form%x(:, form%adjacent(k, v)) - form%x(:, v)))
+        end do
+      end do
       if (edge <= longest) cycle
       longest = edge
       stone%n = form%n
@@ -246,19 +252,5 @@ contains
       stone%x(:, v) = edges*(stone%x(:, v) - 0.5_wp*(low + high))/(high - low)
     end do
   end subroutine stretch
-
-  !> Length of the shortest edge.
-  pure function shortest_edge(stone) result(length)
-    type(polyhedron_t), intent(in) :: stone
-    real(wp) :: length
-    integer :: v, k
-
-    length = huge(length)
-    do v = 1, stone%n
-      do k = 1, 3
-        length = min(length, norm2(stone%x(:, stone%adjacent(k, v)) - stone%x(:, v)))
-      end do
-    end do
-  end function shortest_edge
 
 end module rock_m

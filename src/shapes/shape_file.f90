@@ -215,7 +215,7 @@ contains
     type(words_t), intent(inout) :: words
     logical, intent(in) :: blocks
     type(gmsh_t), intent(inout) :: mesh
-    integer :: n_block, n, b, in_block, found, parameters
+    integer :: n_block, n, b, in_block, found, parameters, dimension, parametric
 
     if (allocated(mesh%tag)) call report(words, '$Nodes stands a second time')
     n_block = 1
@@ -228,8 +228,17 @@ contains
     parameters = 0
     found = 0
     do b = 1, n_block
-      if (blocks) call begin_block(words, parameters)
-      if (blocks) call get_count(words, 'points', 4, in_block)
+      ! Dimension and number of an entity, and how many parameters each of its points carries.
+      if (blocks) then
+        call get_integer(words, dimension)
+        if (dimension < 0 .or. dimension > 3) then
+          call report(words, to_text(dimension)//' stands where a dimension, 0 to 3, should')
+        end if
+        call skip_integers(words, 1)
+        call get_integer(words, parametric)
+        parameters = merge(dimension, 0, parametric == 1)
+        call get_count(words, 'points', 4, in_block)
+      end if
       if (in_block > n - found) call report(words, 'more points than announced')
       if (len(words%problem) > 0) return
       call read_node_block(words, blocks, parameters, mesh%tag(found + 1:found + in_block), &
@@ -240,21 +249,6 @@ contains
     if (found < n) call report(words, 'fewer points than announced')
     call end_section(words, '$EndNodes')
   end subroutine read_nodes
-
-  !> Dimension and number of an entity, and how many parameters each of its points carries.
-  subroutine begin_block(words, parameters)
-    type(words_t), intent(inout) :: words
-    integer, intent(out) :: parameters
-    integer :: dimension, parametric
-
-    call get_integer(words, dimension)
-    if (dimension < 0 .or. dimension > 3) then
-      call report(words, to_text(dimension)//' stands where a dimension, 0 to 3, should')
-    end if
-    call skip_integers(words, 1)
-    call get_integer(words, parametric)
-    parameters = merge(dimension, 0, parametric == 1)
-  end subroutine begin_block
 
   !> Points of one block: all tags first (4.1), or each before its coordinates (2.2).
   subroutine read_node_block(words, tags_first, parameters, tag, x, line)
@@ -300,7 +294,7 @@ contains
     type(words_t), intent(inout) :: words
     logical, intent(in) :: blocks
     type(gmsh_t), intent(inout) :: mesh
-    integer :: n_block, n, b, i, in_block, found, kind
+    integer :: n_block, n, b, i, in_block, found, kind, tags
 
     if (allocated(mesh%tet)) call report(words, '$Elements stands a second time')
     n_block = 1
@@ -319,7 +313,11 @@ contains
       if (in_block > n - found) call report(words, 'more elements than announced')
       do i = 1, in_block
         call skip_integers(words, 1)
-        if (.not. blocks) call get_kind_and_skip_tags(words, kind)
+        if (.not. blocks) then   ! type and tags of version 2.2
+          call get_integer(words, kind)
+          call get_count(words, 'tags', 1, tags)
+          call skip_integers(words, tags)
+        end if
         call read_element(words, kind, mesh)
         if (len(words%problem) > 0) return
       end do
@@ -328,17 +326,6 @@ contains
     if (found < n) call report(words, 'fewer elements than announced')
     call end_section(words, '$EndElements')
   end subroutine read_elements
-
-  !> Type and tags of an element of version 2.2.
-  subroutine get_kind_and_skip_tags(words, kind)
-    type(words_t), intent(inout) :: words
-    integer, intent(out) :: kind
-    integer :: tags
-
-    call get_integer(words, kind)
-    call get_count(words, 'tags', 1, tags)
-    call skip_integers(words, tags)
-  end subroutine get_kind_and_skip_tags
 
   !> The corners of one element, kept if it is a tetrahedron.
   subroutine read_element(words, kind, mesh)

@@ -57,6 +57,8 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(out) :: shape
     character(:), allocatable, intent(out) :: message
+    real(wp) :: centroid(3)
+    integer :: m
 
     message = problem_with(input)
     if (len(message) > 0) return
@@ -73,7 +75,17 @@ contains
     else
       call build_form(input, shape)
     end if
-    call finish_shape(shape)
+    ! Mass, surface and, where the flow has no coarser parts, its parts. The sums over the fewest
+    ! tetrahedra have the least round-off.
+    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
+    if (.not. allocated(shape%flow_tet)) then
+      shape%flow_tet = shape%tet
+      shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
+      shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+    end if
+    call volume_and_centroid(shape%point, shape%flow_tet, shape%volume, centroid)
+    shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
+    shape%inertia = inertia_about_origin(shape%point, shape%flow_tet, shape%density)
     call place_spheres(input, shape, message)
     if (len(message) > 0) return
     shape%radius = max(maxval(norm2(shape%point, 1)), &
@@ -508,23 +520,5 @@ contains
     number = n_point
     point(:, number) = x
   end subroutine find_or_add
-
-  !> Mass, surface and, where the flow has no coarser parts, its parts. The sums over the fewest
-  !! tetrahedra have the least round-off.
-  pure subroutine finish_shape(shape)
-    type(shape_t), intent(inout) :: shape
-    real(wp) :: centroid(3)
-    integer :: m
-
-    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
-    if (.not. allocated(shape%flow_tet)) then
-      shape%flow_tet = shape%tet
-      shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
-      shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
-    end if
-    call volume_and_centroid(shape%point, shape%flow_tet, shape%volume, centroid)
-    shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
-    shape%inertia = inertia_about_origin(shape%point, shape%flow_tet, shape%density)
-  end subroutine finish_shape
 
 end module shapes_builtin_m

@@ -30,7 +30,8 @@ contains
     integer, allocatable :: edge(:, :), bend(:)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: is_corner(:)
-    integer :: e
+    integer :: e, f, c, before
+    real(wp) :: p(3), u(3), w(3)
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -44,7 +45,21 @@ contains
     surface%length = 0.25_wp*shape%smallest_edge
     call make_facets(shape, surface)
     call pair_edges(shape, edge)
-    call outward_at_points(shape, surface%normal, point_normal)
+    ! Sum of the normals of the facets at each point, weighted by their angle there: it points
+    ! outward as seen from any place nearest to that point (Baerentzen and Aanaes, 2005).
+    allocate (point_normal(3, size(shape%point, 2)), source=0.0_wp)
+    do f = 1, size(surface%normal, 2)
+      before = shape%facet(f + 1) - 1
+      do c = shape%facet(f), shape%facet(f + 1) - 1
+        p = shape%point(:, shape%facet_point(c))
+        u = shape%point(:, next_corner(shape, f, c)) - p
+        w = shape%point(:, shape%facet_point(before)) - p
+        associate (sum_here => point_normal(:, shape%facet_point(c)))
+          sum_here = sum_here + atan2(norm(cross(u, w)), dot_product(u, w))*surface%normal(:, f)
+        end associate
+        before = c
+      end do
+    end do
     bend = [(bend_of(shape, edge(:, e), surface%normal), e=1, size(edge, 2))]
     call find_corners(shape, edge, bend, point_normal, is_corner)
     call make_edges(shape, edge, bend, point_normal, surface)
@@ -157,30 +172,6 @@ contains
     end do
     edge = found(:, :n)
   end subroutine pair_edges
-
-  !> Sum of the normals of the facets at each point, weighted by their angle there: it points
-  !! outward as seen from any place nearest to that point (Baerentzen and Aanaes, 2005).
-  pure subroutine outward_at_points(shape, normal, point_normal)
-    type(shape_t), intent(in) :: shape
-    real(wp), intent(in) :: normal(:, :)                       !! (3, facets)
-    real(wp), allocatable, intent(out) :: point_normal(:, :)   !! (3, points)
-    real(wp) :: p(3), u(3), w(3)
-    integer :: f, c, before
-
-    allocate (point_normal(3, size(shape%point, 2)), source=0.0_wp)
-    do f = 1, size(normal, 2)
-      before = shape%facet(f + 1) - 1
-      do c = shape%facet(f), shape%facet(f + 1) - 1
-        p = shape%point(:, shape%facet_point(c))
-        u = shape%point(:, next_corner(shape, f, c)) - p
-        w = shape%point(:, shape%facet_point(before)) - p
-        associate (sum_here => point_normal(:, shape%facet_point(c)))
-          sum_here = sum_here + atan2(norm(cross(u, w)), dot_product(u, w))*normal(:, f)
-        end associate
-        before = c
-      end do
-    end do
-  end subroutine outward_at_points
 
   !> Corners that may touch: where a sharp convex edge ends, since past its end the crossing with
   !! another edge does not count (on a saddle of a bed an edge rests on such a corner though others

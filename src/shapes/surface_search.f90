@@ -86,7 +86,8 @@ contains
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
     integer, parameter :: scan = 8   !! marks looked at for each item found: quicker than sorting
-    integer :: a(3), b(3), i, j, k, m, bin, item
+    integer :: a(3), b(3), i, j, k, m, bin, item, g
+    integer, parameter :: gap(7) = [701, 301, 132, 57, 23, 10, 4]   !! Ciura (2001), and 1
 
     list%n = 0
     call ensure_capacity(1, list%item)
@@ -121,7 +122,11 @@ contains
       end do
     end do
     if (n_items > scan*list%n) then
-      call sort_items(list%item(:list%n))
+      ! Ascending order, by Shell's method: lists may be long over a fine bed.
+      do g = 1, size(gap)
+        if (gap(g) < list%n) call sort_by_gap(gap(g), list%item(:list%n))
+      end do
+      call sort_by_gap(1, list%item(:list%n))
     else
       list%n = 0
       do item = 1, n_items
@@ -131,18 +136,6 @@ contains
       end do
     end if
   end subroutine gather
-
-  !> Ascending order, by Shell's method: lists may be long over a fine bed.
-  pure subroutine sort_items(item)
-    integer, intent(inout) :: item(:)
-    integer, parameter :: gap(7) = [701, 301, 132, 57, 23, 10, 4]   !! Ciura (2001), and 1
-    integer :: g
-
-    do g = 1, size(gap)
-      if (gap(g) < size(item)) call sort_by_gap(gap(g), item)
-    end do
-    call sort_by_gap(1, item)
-  end subroutine sort_items
 
   !> Ascending order of the items at places that differ by a gap.
   pure subroutine sort_by_gap(gap, item)
