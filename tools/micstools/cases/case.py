@@ -286,7 +286,7 @@ class Case:
         for name, value in options.items():
             words += [f"--{name.replace('_', '-')}", str(value)]
         case = folder.with_name(f"{folder.name}.nml")
-        case.write_text(self._here())
+        files.write(case, self._here())
         code = ENSEMBLE.work(parser.parse_args([str(case), *words]))
         if code:
             raise BadRun(f"{folder}: not all runs came to their end (code {code})")

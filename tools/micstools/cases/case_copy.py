@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from micstools import files
 from micstools.cases import settings
 from micstools.reading.reader import BadRun
 
@@ -46,9 +47,9 @@ def keep(case: Path, text: str) -> None:
                 raise BadRun(f"{name} has changed since {case} was run: give another --out")
     case.parent.mkdir(parents=True, exist_ok=True)
     if not case.exists():
-        case.write_text(text)
+        files.write(case, text)
     if sums and not said.exists():
-        said.write_text(json.dumps(sums, indent=2) + "\n")
+        files.write(said, json.dumps(sums, indent=2) + "\n")
 
 
 def checksums(text: str) -> dict[str, str]:

@@ -5,6 +5,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from micstools import files
 from micstools.cases import program
 from micstools.cases.calibrate import Calibration
 from micstools.commands.base import Command
@@ -27,7 +28,7 @@ def _calibrate(given: argparse.Namespace) -> int:
     folder = given.out or Path(f"mics-calibrate-{given.shape}")
     found = Calibration(program.find(given.program, given.case), given.case, given.shape, folder,
                         given.threads).fit(given.falls)  # fmt: skip
-    (folder / "calibrate.json").write_text(json.dumps(asdict(found), indent=1) + "\n")
+    files.write(folder / "calibrate.json", json.dumps(asdict(found), indent=1) + "\n")
     print(
         f"! &shape '{found.shape}', {found.note}: {len(found.falls)} falls, scatter "
         f"{found.scatter:.2f}; rms of speed {100 * found.rms_speed:.1f} %, time to the floor "

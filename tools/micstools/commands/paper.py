@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from micstools import files
 from micstools.cases import program
 from micstools.commands.base import Command
 from micstools.commands.ensemble import ENSEMBLE
@@ -60,7 +61,7 @@ def _ensemble(given: argparse.Namespace, choice: Choice, case: str, folder: Path
     print(f"-- {choice.words}")
     path = folder.with_suffix(".nml")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(choice.text(case))
+    files.write(path, choice.text(case))
     other = ("--program", str(given.program)) if given.program else ()
     words = ("--runs", str(runs), "--jobs", str(given.jobs), "--out", str(folder))
     return _call(ENSEMBLE, str(path), *words, *choice.options, *other)
@@ -73,7 +74,7 @@ def _call(command: Command, *words: str) -> int:
 
 
 def _write(folder: Path, rows: list[dict[str, Any]]) -> None:
-    (folder / "shares.md").write_text(paper_ensemble.as_markdown(rows))
+    files.write(folder / "shares.md", paper_ensemble.as_markdown(rows))
     with (folder / "shares.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()

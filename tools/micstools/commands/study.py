@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from micstools import files
 from micstools.cases import case_copy, program, settings
 from micstools.cases.convergence import Convergence, converge
 from micstools.commands.base import Command
@@ -110,7 +111,7 @@ def _tell(
         writer.writeheader()
         writer.writerows(rows)
     known = [{k: None if v != v else v for k, v in row.items()} for row in rows]
-    (folder / "study.json").write_text(json.dumps(known, indent=2) + "\n")
+    files.write(folder / "study.json", json.dumps(known, indent=2) + "\n")
     print(folder / "study.csv")
 
 

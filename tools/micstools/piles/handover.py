@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from micstools import files
 from micstools.piles import pile_form
 from micstools.piles.layer import Maps, parted
 from micstools.reading import places
@@ -47,7 +48,7 @@ class Handover:
 
 def to_csv(given: Handover, path: Path) -> Path:
     """A row per unit."""
-    path.write_text(places.csv_text(given.places))
+    files.write(path, places.csv_text(given.places))
     return path
 
 
@@ -118,7 +119,7 @@ def _collection(path: Path, found: list[dict[str, Any]], crs: str | None) -> Pat
     content: dict[str, Any] = {"type": "FeatureCollection"}
     if crs:
         content["crs"] = {"type": "name", "properties": {"name": crs_name(crs)}}
-    path.write_text(json.dumps(content | {"features": found}, allow_nan=False) + "\n")
+    files.write(path, json.dumps(content | {"features": found}, allow_nan=False) + "\n")
     return path
 
 
@@ -207,7 +208,7 @@ def raster(path: Path, values: Array, survey: Survey, low: Array, step: float) -
             "NODATA_value": -9999}  # fmt: skip
     lines = [f"{name} {value}" for name, value in head.items()]
     lines += [" ".join(f"{v:.9g}" for v in row) for row in np.nan_to_num(values[::-1], nan=-9999)]
-    path.write_text("\n".join(lines) + "\n")
+    files.write(path, "\n".join(lines) + "\n")
     return path
 
 

