@@ -22,9 +22,21 @@ module coupling_m
   use rigid_body_m, only: blocks_t, space_tensor, set_velocity_after_fluid
   implicit none
   private
-  public :: coupling_t, coupling_report_t, coupling_init, copy_motion, push_bodies
+  public :: coupling_t, coupling_report_t, coupling_init, copy_motion, push_bodies, move_by_forces
+  public :: by_old_pressure, by_displaced, by_half_kick, left_by_walls, by_viscosity
+  public :: by_new_pressure, by_walls
   public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
   public :: find_surface_force, start_of_stages, motion_after_fluid
+
+  !> Forces of the fluid on a body, in the order in which a step finds them.
+  integer, parameter :: by_old_pressure = 1   !! that of the start, and surface tension
+  integer, parameter :: by_displaced = 2      !! what the faces miss of the displaced fluid
+  integer, parameter :: by_half_kick = 3      !! what the halves of the old pressure differ by
+  integer, parameter :: left_by_walls = 4     !! of the walls, found too late in the last step
+  integer, parameter :: by_viscosity = 5
+  integer, parameter :: by_new_pressure = 6   !! what the projection adds to the old
+  integer, parameter :: by_walls = 7          !! of the walls
+  integer, parameter :: n_forces = 7
 
   type :: coupling_report_t
     type(pressure_report_t) :: pressure
@@ -43,9 +55,10 @@ module coupling_m
     type(pressure_t) :: pressure
     type(surface_tension_t) :: tension
     type(acceleration_t) :: acceleration
-    real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
-    real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
-    real(wp), allocatable :: total(:, :)           !! (6, n)
+    real(wp), allocatable :: unforced_motion(:, :)   !! (6, n) by weight and contact alone
+    real(wp), allocatable :: force(:, :, :)
+      !! (6, n, `by_old_pressure`...) of the fluid on the bodies in this step [N, N m]
+    real(wp), allocatable :: total(:, :)   !! (6, n) their sum, with the inertia of displaced fluid
   contains
     procedure(of_release), deferred :: force_at_release
     procedure(of_start), deferred :: begin
@@ -129,8 +142,8 @@ contains
     call pressure_init(grid, n, case%numerics, self%pressure)
     call acceleration_init(grid, self%acceleration)
     call surface_tension_init(grid, case%fluid, self%tension)
-    allocate (self%from_pressure(6, n), source=0.0_wp)
-    allocate (self%from_level, self%total, source=self%from_pressure)
+    allocate (self%force(6, n, n_forces), source=0.0_wp)
+    allocate (self%unforced_motion(6, n), self%total(6, n), source=0.0_wp)
   end subroutine coupling_init
 
   !> Before the stages that follow the transport: the bodies move as contact and weight make them,
@@ -143,7 +156,10 @@ contains
     integer :: b
 
     self%total = 0.0_wp
+    self%force = 0.0_wp
+    self%force(:, :blocks%n, left_by_walls) = blocks%lagged_force
     call motion_after_fluid(gravity, dt, blocks, self)
+    self%unforced_motion = self%bodies%motion
     self%at_start = self%bodies
     do b = 1, blocks%n
       if (.not. (self%bodies%free(b) .or. blocks%path(b)%n > 0)) cycle
@@ -270,5 +286,14 @@ contains
       bodies%motion(:, b) = bodies%motion(:, b) + dt*matmul(bodies%mobility(:, :, b), force(:, b))
     end do
   end subroutine push_bodies
+
+  !> Motion at the end of the step by weight, contact and the forces of the fluid found so far.
+  subroutine move_by_forces(dt, self)
+    real(wp), intent(in) :: dt   !! [s]
+    class(coupling_t), intent(inout) :: self
+
+    self%bodies%motion = self%unforced_motion
+    call push_bodies(dt, sum(self%force, 3), self%bodies)
+  end subroutine move_by_forces
 
 end module coupling_m

@@ -27,7 +27,8 @@ module mass_average_m
   use buoyancy_m, only: displaced_force
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
-  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
+  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, move_by_forces, &
+    by_displaced, by_new_pressure, &
     accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
   use rigid_body_m, only: blocks_t
   use mixture_m, only: face_mean
@@ -114,9 +115,9 @@ contains
     type(stage_t), intent(in) :: s
 
     associate (bodies => self%bodies)
-      call displaced_force(s%grid, self%fluid, s%solid, bodies, s%flow%c, self%from_level)
-      call push_bodies(s%dt, self%from_level, bodies)
-      self%total = self%from_level
+      call displaced_force(s%grid, self%fluid, s%solid, bodies, s%flow%c, &
+                           self%force(:, :, by_displaced))
+      call move_by_forces(s%dt, self)
       call density_of_mixture(s%grid, s%solid, bodies, s%flow%rho, self%rho)
       call average_cells(s%grid, s%solid, bodies, s%flow, self%rho)
     end associate
@@ -203,10 +204,10 @@ contains
         if (pass > 1) self%pressure%report = both_solves(report%pressure, self%pressure%report)
         report%pressure = self%pressure%report
         call momentum_gained(grid, s%solid, s%dt, flow%u, self)
-        call push_bodies(s%dt, self%from_pressure, self%bodies)
-        self%total = self%total + self%from_pressure
+        call move_by_forces(s%dt, self)
       end do
     end associate
+    self%total = sum(self%force, 3)
     report%viscous_converged = self%viscous%converged
   end subroutine project
 
@@ -291,8 +292,8 @@ contains
     end associate
   end subroutine project_mixture
 
-  !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum
-  !! that the mixture gained in its cells since `u_before`.
+  !> Add to the force by pressure the volume integral of -grad p + div tau less its hydrostatic part
+  !! over each body: the momentum that the mixture gained in its cells since `u_before`.
   subroutine momentum_gained(grid, solid, dt, u, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -321,7 +322,8 @@ contains
       call exact_add_columns(self%terms(1:n, :), accumulator(:, 6*b - 5:6*b))
     end do
     call exact_totals(accumulator, total)
-    self%from_pressure(:, :self%bodies%n) = reshape(total, [6, self%bodies%n])
+    self%force(:, :, by_new_pressure) = self%force(:, :, by_new_pressure) &
+                                        + reshape(total, [6, self%bodies%n])
   end subroutine momentum_gained
 
   !> Stage 14: give cells and faces the final rigid velocity by mass average; what divergence that

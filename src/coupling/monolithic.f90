@@ -35,7 +35,8 @@ module monolithic_m
                             store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
-  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
+  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, move_by_forces, &
+    by_old_pressure, by_displaced, by_half_kick, by_viscosity, by_new_pressure, by_walls, &
     accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
   use rigid_body_m, only: blocks_t, change_by_motion
   use boundary_m, only: fill_velocity_halo
@@ -48,21 +49,19 @@ module monolithic_m
     !! tolerance of the first of two pressure solves over that of the second
 
   type, extends(coupling_t) :: monolithic_t
-    real(wp), allocatable :: unforced_motion(:, :)      !! (6, n) by weight and contact only
     type(rigid_motion_t) :: predicted               !! the motion at the end, by `extrapolated`
     real(wp), allocatable :: extrapolated(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(merged_cells_t), allocatable :: merged_before, merged
       !! of the surface at the start and at the end of the step
-    real(wp), allocatable :: given(:, :, :, :)
+    real(wp), allocatable :: kick(:, :, :, :)
       !! momentum of the first half kick [kg m/s]
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: held(:, :, :)           !! (6, 3, n) fluid held at faces
-    real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
-    real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
-    real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
+    real(wp), allocatable :: held_motion(:, :)     !! (6, n) motion that held fluid has got
+    real(wp), allocatable :: left_over(:, :)       !! (6, n) force of the walls for the next step
     real(wp), allocatable :: correction(:, :, :, :)
       !! of the faces at the start of the step (`old_time_correction_m`) [m/s]
   contains
@@ -96,12 +95,11 @@ contains
     call merged_cells_init(grid, self%merged)
     call wall_balance_init(self%balance)
     allocate (self%defect(6, 3, n), self%held(6, 3, n), source=0.0_wp)
-    allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
-              self%extrapolated, source=self%total)
+    allocate (self%held_motion, self%left_over, self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     if (self%implicit_momentum) return
-    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%correction, source=self%given)
+    allocate (self%kick(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%correction, source=self%kick)
   end subroutine monolithic_init
 
   !> Stage 3: the motion of the bodies as it goes on, the merged cells at the start; for C-ISMAC the
@@ -111,13 +109,17 @@ contains
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     type(blocks_t), intent(in) :: blocks
+    type(merged_cells_t), allocatable :: keep
 
     call extrapolate_motion(self%fluid%gravity, s%dt, blocks, self)
-    self%lagged(:, :blocks%n) = blocks%lagged_force
-    call find_merged_before(s%grid, s%solid, self)
+    ! the merged cells of the end of the last step, or new ones if blocks have come
+    call move_alloc(self%merged_before, keep)
+    call move_alloc(self%merged, self%merged_before)
+    call move_alloc(keep, self%merged)
+    call find_merged_cells(s%grid, s%solid, self%merged_before)
     associate (grid => s%grid, solid => s%solid, flow => s%flow, fluid => self%fluid, &
                a => self%acceleration)
-      call find_liquid(grid, flow, a%given)
+      call find_liquid(grid, flow, a%kicked)
       if (self%implicit_momentum) then
         call find_surface_force(s, self)
         call keep_acceleration(s, solid%aperture, flow%rho, self)
@@ -129,24 +131,10 @@ contains
         call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
         call find_first_half(grid, solid, self%merged_before, self%bodies, &
                              self%extrapolated/s%dt, flow%rho, a)
-        call add_first_half(grid, fluid, s%dt, a, flow, self%given)
+        call add_first_half(grid, fluid, s%dt, a, flow, self%kick)
       end if
     end associate
   end subroutine begin
-
-  !> The merged cells of the start of the step: those of the end of the last one, or new ones if
-  !! blocks have come.
-  subroutine find_merged_before(grid, solid, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid   !! at the start
-    class(monolithic_t), intent(inout) :: self
-    type(merged_cells_t), allocatable :: keep
-
-    call move_alloc(self%merged_before, keep)
-    call move_alloc(self%merged, self%merged_before)
-    call move_alloc(keep, self%merged)
-    call find_merged_cells(grid, solid, self%merged_before)
-  end subroutine find_merged_before
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
   !! the fluid that gets the old pressure.
@@ -177,7 +165,6 @@ contains
     type(stage_t), intent(in) :: s
     integer :: k
 
-    self%unforced_motion = self%bodies%motion
     associate (grid => s%grid, solid => s%solid, flow => s%flow, merged => self%merged, &
                balance => self%balance)
       call find_merged_cells(grid, solid, merged)
@@ -217,11 +204,12 @@ contains
 
     call take(s%scratch, by_stress)
     call find_surface_force(s, self)
-    associate (grid => s%grid, flow => s%flow, a => self%acceleration)
+    associate (grid => s%grid, flow => s%flow, bodies => self%bodies, a => self%acceleration, &
+               force => self%force, flux => self%pressure%system%operator%flux)
       call face_acceleration(grid, self%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, self%rho, self%tension, a%face)
-      self%counted = self%at_start%motion + self%extrapolated
+      self%held_motion = self%at_start%motion + self%extrapolated
       call accelerations_of_groups(s, self%extrapolated, self)
       if (self%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, s%solid%alpha, self%rho, flow%mu, flow%u, by_stress)
@@ -229,12 +217,18 @@ contains
         call accelerate_cells(s, self)
       else
         call add_second_half(grid, s%dt, a, flow%u)
-        self%from_half_kick = force_of_half_kick(grid, self%fluid, self%merged_before, &
-          self%merged, self%bodies, s%dt, flow, a, self%given)
+        force(:, :, by_half_kick) = force_of_half_kick(grid, self%fluid, self%merged_before, &
+          self%merged, bodies, s%dt, flow, a, self%kick)
       end if
       call add_product(grid, s%dt, by_stress, flow%u)
+
+      call force_from_faces(grid, bodies, flux, flow%p, force(:, :, by_old_pressure), flow%sides)
+      call force_from_tension(grid, bodies, flux, self%tension, force(:, :, by_old_pressure))
+      self%defect = mass_defect(grid, self%fluid, s%solid, bodies, flux, flow)
+      self%held = held_mass(grid, bodies, flux, flow%rho)
+      call count_fluid(self%fluid%gravity, s%dt, self)
+      call move_by_forces(s%dt, self)
     end associate
-    call push_by_known_forces(s, self)
     call give(s%scratch, self%tension%force)
     call give(s%scratch, by_stress)
   end subroutine add_forces
@@ -255,23 +249,6 @@ contains
     end associate
   end subroutine accelerations_of_groups
 
-  !> The same forces on the bodies.
-  subroutine push_by_known_forces(s, self)
-    type(stage_t), intent(in) :: s
-    class(monolithic_t), intent(inout) :: self
-
-    associate (grid => s%grid, flow => s%flow, bodies => self%bodies, &
-               flux => self%pressure%system%operator%flux)
-      call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
-      call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
-      self%defect = mass_defect(grid, self%fluid, s%solid, bodies, flux, flow)
-      self%held = held_mass(grid, bodies, flux, flow%rho)
-      call count_fluid(self%fluid%gravity, s%dt, self)
-      self%from_level = self%from_level + self%from_half_kick + self%lagged
-      call push_bodies(s%dt, self%from_pressure + self%from_level, bodies)
-    end associate
-  end subroutine push_by_known_forces
-
   !> Stage 11: viscosity, in cells and bodies at once; with C-ISMAC advection, too.
   subroutine add_viscosity(self, s)
     class(monolithic_t), intent(inout) :: self
@@ -291,9 +268,8 @@ contains
       call to_centres(grid, merged, self%at_start, u, back=.true.)
       call fill_velocity_halo(grid, u, layers=1)
       call follow_targets(grid, merged, balance%mass, balance%before, u, balance%to_wall)
-      ! To round-off the motion that the forces give, not that of the solver.
-      bodies%motion = self%unforced_motion
-      call push_bodies(s%dt, self%from_pressure + self%from_level + viscous%force, bodies)
+      self%force(:, :, by_viscosity) = viscous%force
+      call move_by_forces(s%dt, self)   ! to round-off, unlike the motion of the solver
       call impose_rigid_velocity(grid, solid, merged, bodies, u)
     end associate
     call give_arrays(s%scratch, self%viscous)
@@ -310,7 +286,7 @@ contains
                merged => self%merged)
       call fill_velocity_halo(grid, flow%u, layers=1)
       call halo_exchange(a%cell, n_halo, layers=1)
-      call find_liquid(grid, flow, a%in_liquid, among=a%given)   ! the surface may have come
+      call find_liquid(grid, flow, a%in_liquid, among=a%kicked)   ! the surface may have come
       if (self%implicit_momentum) then
         call predict_face_velocity(grid, dt, self%rho, a, flow)
       else
@@ -334,57 +310,68 @@ contains
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     type(coupling_report_t), intent(inout) :: report
-    real(wp), dimension(6, self%bodies%n) :: of_walls, of_walls_again
+    real(wp) :: of_walls(6, self%bodies%n)
     integer :: b
 
-    self%total = 0.0_wp
     associate (bodies => self%bodies, pressure => self%pressure)
+      self%left_over = 0.0_wp
       if (any(bodies%free)) then
         call solve_once(s, rough_factor*pressure%tolerance, self, of_walls)
         report%pressure = pressure%report
-        call push_bodies(s%dt, of_walls, bodies)
-        call solve_once(s, pressure%tolerance, self, of_walls_again)
+        self%force(:, :, by_walls) = of_walls
+        call move_by_forces(s%dt, self)
+        call solve_once(s, pressure%tolerance, self, of_walls)
         report%pressure = both_solves(report%pressure, pressure%report)
+        do b = 1, bodies%n
+          if (bodies%free(b)) self%left_over(:, b) = of_walls(:, b) - self%force(:, b, by_walls)
+        end do
       else
         call solve_once(s, pressure%tolerance, self, of_walls)
         report%pressure = pressure%report
+        self%force(:, :, by_walls) = of_walls
       end if
-      self%total = self%total + of_walls
-      self%lagged = 0.0_wp
-      do b = 1, bodies%n
-        if (bodies%free(b)) self%lagged(:, b) = of_walls_again(:, b) - of_walls(:, b)
-      end do
       call impose_rigid_velocity(s%grid, s%solid, self%merged, bodies, s%flow%u)
       call fill_velocity_halo(s%grid, s%flow%u)
       call extend_pressure(s%grid, self%fluid%gravity, s%solid%alpha, s%flow, pressure)
+      self%total = sum(self%force, 3)
+      do b = 1, bodies%n   ! the displaced fluid resists the acceleration that the solve has found
+        if (bodies%free(b)) self%total(:, b) = self%total(:, b) &
+          + matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%unforced_motion(:, b))/s%dt
+      end do
     end associate
-    call sum_forces(s%dt, self)
     report%viscous_converged = self%viscous%converged
   end subroutine project
 
   !> Pressure and motion of the bodies, the cells after them, and the force that the walls bear so
-  !! far; the force of the new pressure joins `total`.
+  !! far.
   subroutine solve_once(s, tolerance, self, of_walls)
     type(stage_t), intent(in) :: s
     real(wp), intent(in) :: tolerance   !! of the divergence [1/s]
     class(monolithic_t), intent(inout) :: self
     real(wp), intent(out) :: of_walls(:, :)   !! (6, bodies) [N, N m]
     real(wp), parameter :: weightless(3) = 0.0_wp
-    real(wp) :: from_faces(6, self%bodies%n)
+    real(wp) :: from_faces(6, self%bodies%n), inertia(6, 6)
+    integer :: b
 
     associate (grid => s%grid, flow => s%flow, bodies => self%bodies, pressure => self%pressure, &
-               a => self%acceleration)
+               a => self%acceleration, by_pressure => self%force(:, :, by_new_pressure))
       call solve_pressure(s, self%rho, bodies, pressure, tolerance)
       call face_acceleration(grid, weightless, self%rho, self%rho, pressure%phi_total, a%face, &
                              flow%sides)
-      call accelerations_of_groups(s, bodies%motion - self%counted, self)
-      self%counted = bodies%motion
+      call accelerations_of_groups(s, bodies%motion - self%held_motion, self)
+      self%held_motion = bodies%motion
       call add_product(grid, s%dt, a%cell, flow%u)
       call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
                             from_faces)
-      self%total = self%total + from_faces
+      by_pressure = by_pressure + from_faces
       call force_of_walls(grid, self%merged, bodies, self%at_start, s%dt, self%balance, of_walls)
-      call leave_counted(s%dt, self, of_walls)
+      ! less what they bear as the fluid that no aperture counts moves with the bodies, which
+      ! `count_fluid` has given them
+      do b = 1, bodies%n
+        inertia = symmetric(self%defect(:, :, b) + self%held(:, :, b))
+        of_walls(1:3, b) = of_walls(1:3, b) - matmul(inertia(1:3, :), &
+          bodies%motion(:, b) - self%at_start%motion(:, b))/s%dt
+      end do
     end associate
   end subroutine solve_once
 
@@ -398,47 +385,14 @@ contains
 
     associate (unused => report)
     end associate
-    blocks%lagged_force = self%lagged(:, :blocks%n)
+    blocks%lagged_force = self%left_over(:, :blocks%n)
     call all_fluid_of_faces(s%grid, s%solid, self%bodies, self%pressure%system%operator%flux, &
                             s%flow%uf, s%flow%solid_flux)
   end subroutine close_faces
 
-  !> Take from the forces of the walls what they bear as the fluid that no aperture counts moves
-  !! with the bodies: `count_fluid` has given them that.
-  subroutine leave_counted(dt, self, from_walls)
-    real(wp), intent(in) :: dt   !! [s]
-    class(monolithic_t), intent(in) :: self
-    real(wp), intent(inout) :: from_walls(:, :)   !! (6, bodies) [N, N m]
-    real(wp) :: inertia(6, 6)
-    integer :: b
-
-    do b = 1, size(self%defect, 3)
-      inertia = symmetric(self%defect(:, :, b) + self%held(:, :, b))
-      from_walls(1:3, b) = from_walls(1:3, b) - matmul(inertia(1:3, :), &
-        self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
-    end do
-  end subroutine leave_counted
-
-  !> Force and torque of the step on each body, the inertia of the fluid that no face counts
-  !! included, by the acceleration that the solve has found.
-  subroutine sum_forces(dt, self)
-    real(wp), intent(in) :: dt
-    class(monolithic_t), intent(inout) :: self
-    integer :: b
-
-    associate (bodies => self%bodies)
-      self%total = self%total + self%from_pressure + self%from_level + self%viscous%force
-      do b = 1, bodies%n
-        if (.not. bodies%free(b)) cycle
-        self%total(:, b) = self%total(:, b) + &
-          matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%unforced_motion(:, b))/dt
-      end do
-    end associate
-  end subroutine sum_forces
-
-  !> Give free bodies the inertia of the fluid that the faces do not count, and `from_level` its
-  !! force as far as it is known before the solve: -defect (g - a), a by weight and contact, or by
-  !! the given motion.
+  !> Give free bodies the inertia of the fluid that the faces do not count, and the force of it as
+  !! far as it is known before the solve: -defect (g - a), a by weight and contact, or by the given
+  !! motion.
   subroutine count_fluid(gravity, dt, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
@@ -453,7 +407,7 @@ contains
         call set_inertia(b, self%bodies, inertia)
         inertia = self%bodies%defect(:, :, b)
       end if
-      self%from_level(:, b) = matmul(inertia, self%bodies%motion(:, b) &
+      self%force(:, b, by_displaced) = matmul(inertia, self%bodies%motion(:, b) &
         - self%at_start%motion(:, b))/dt - matmul(self%defect(:, :, b), gravity)
     end do
   end subroutine count_fluid

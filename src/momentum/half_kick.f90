@@ -43,32 +43,32 @@ contains
 
   !> Acceleration of the cells that take part from that of the faces, by weight and old pressure;
   !! halo filled, small cells as their targets.
-  subroutine find_first_half(grid, solid, merged, bodies, held, rho, a)
+  subroutine find_first_half(grid, solid, merged, bodies, held_acceleration, rho, a)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
     type(merged_cells_t), intent(in) :: merged     !! likewise
     type(rigid_motion_t), intent(in) :: bodies    !! likewise
-    real(wp), intent(in) :: held(:, :)
+    real(wp), intent(in) :: held_acceleration(:, :)
       !! (6, bodies) acceleration of what they hold of the fluid [m/s2, rad/s2]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [kg/m3]
     type(acceleration_t), intent(inout) :: a
 
     call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
-    call hold_in_cells(grid, solid, bodies, held, a%face, a%cell)
-    call change_where(grid, a%given, .false., a%cell)
+    call hold_in_cells(grid, solid, bodies, held_acceleration, a%face, a%cell)
+    call change_where(grid, a%kicked, .false., a%cell)
     call halo_exchange(a%cell, n_halo)
     call share_acceleration(grid, solid%aperture, rho, merged, a%cell)
   end subroutine find_first_half
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine add_first_half(grid, fluid, dt, a, flow, given)
+  subroutine add_first_half(grid, fluid, dt, a, flow, kick)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     real(wp), intent(in) :: dt            !! [s]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow   !! of the start of the step
-    real(wp), intent(inout), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: kick(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! momentum that the cells get [kg m/s]
     integer :: i, j, k
     real(wp) :: mass
@@ -77,13 +77,13 @@ contains
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          if (.not. a%given(i, j, k)) then
-            given(i, j, k, :) = 0.0_wp
+          if (.not. a%kicked(i, j, k)) then
+            kick(i, j, k, :) = 0.0_wp
             cycle
           end if
           mass = mass_through(fluid, flow%fluid_volume(i, j, k), flow%liquid(i, j, k))
           flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a%cell(i, j, k, :)
-          given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+          kick(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
@@ -97,7 +97,7 @@ contains
     type(acceleration_t), intent(in) :: a
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call change_where(grid, a%given, .true., u, 0.5_wp*dt, a%cell)
+    call change_where(grid, a%kicked, .true., u, 0.5_wp*dt, a%cell)
   end subroutine add_second_half
 
   !> Weight and old pressure in all other cells.
@@ -107,7 +107,7 @@ contains
     type(acceleration_t), intent(in) :: a
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call change_where(grid, a%given, .false., u, dt, a%cell)
+    call change_where(grid, a%kicked, .false., u, dt, a%cell)
   end subroutine add_whole
 
   !> u += time a, or u = 0 without a, in the own cells that take part or in those that do not.
@@ -170,8 +170,8 @@ contains
   end subroutine find_liquid
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
-  !! start (`given`) and on that of the end differ [N, N m].
-  function force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, given) &
+  !! start (`kick`) and on that of the end differ [N, N m].
+  function force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, kick) &
     result(force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
@@ -180,7 +180,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(in) :: flow
     type(acceleration_t), intent(in) :: a   !! on the surface of the end, of groups
-    real(wp), intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: kick(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [kg m/s]
     real(wp) :: force(6, bodies%n)
     integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
@@ -214,8 +214,8 @@ contains
 
       f = 0.0_wp
       if (.not. grid%owns(c)) return
-      f = -given(c(1), c(2), c(3), :)
-      if (a%given(c(1), c(2), c(3))) then
+      f = -kick(c(1), c(2), c(3), :)
+      if (a%kicked(c(1), c(2), c(3))) then
         mass = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
                             flow%liquid(c(1), c(2), c(3)))
         f = f + 0.5_wp*dt*mass*a%cell(c(1), c(2), c(3), :)

@@ -117,7 +117,7 @@ contains
     a%face(:, :, k, 1) = 0.0_wp
     do j = grid%lo(2), grid%hi(2)
       do i = grid%lo(1), grid%hi(1)
-        if (.not. a%given(i, j, k)) cycle
+        if (.not. a%kicked(i, j, k)) cycle
         if (.not. any(abs(a%cell(i, j, k, :)) > 0.0_wp)) cycle
         associate (q => p(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1), w => a%cell(i, j, k, :))
           up = [q(3, 2, 2), q(2, 3, 2), q(2, 2, 3)] - q(2, 2, 2) - weight*grid%h

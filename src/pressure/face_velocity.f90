@@ -18,7 +18,7 @@ module face_velocity_m
   type :: acceleration_t
     real(wp), allocatable :: face(:, :, :, :)   !! of the lower faces, along their normal [m/s2]
     real(wp), allocatable :: cell(:, :, :, :)   !! mean of the two faces of each direction [m/s2]
-    logical, allocatable :: given(:, :, :)
+    logical, allocatable :: kicked(:, :, :)
       !! cells that have it in their velocity before the faces: all cells around them were full of
       !! liquid at the start of the step (`half_kick_m`)
     logical, allocatable :: in_liquid(:, :, :)  !! those of them that are so at its end, too
@@ -36,8 +36,8 @@ contains
     b = grid%last
     allocate (self%face(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%cell, source=self%face)
-    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
-    allocate (self%in_liquid, source=self%given)
+    allocate (self%kicked(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
+    allocate (self%in_liquid, source=self%kicked)
   end subroutine acceleration_init
 
   !> Acceleration at the faces: a_f = (rho_w,f g - (p_high - p_low)/h)/rho_f [m/s2].
@@ -263,7 +263,7 @@ contains
       real(wp) :: u
 
       u = flow%u(c(1), c(2), c(3), d)
-      if (present(correction) .and. .not. a%given(c(1), c(2), c(3))) return
+      if (present(correction) .and. .not. a%kicked(c(1), c(2), c(3))) return
       u = u - dt*a%cell(c(1), c(2), c(3), d)
     end function without_acceleration
   end subroutine predict_face_velocity
@@ -317,8 +317,8 @@ contains
         do i = grid%lo(1), grid%hi(1) + e(1)
           associate (p => i - e(1), q => j - e(2), r => k - e(3))
             if (a%in_liquid(p, q, r) .and. a%in_liquid(i, j, k)) cycle
-            low = flow%u(p, q, r, d) - merge(dt, 0.0_wp, a%given(p, q, r))*a%cell(p, q, r, d)
-            high = flow%u(i, j, k, d) - merge(dt, 0.0_wp, a%given(i, j, k))*a%cell(i, j, k, d)
+            low = flow%u(p, q, r, d) - merge(dt, 0.0_wp, a%kicked(p, q, r))*a%cell(p, q, r, d)
+            high = flow%u(i, j, k, d) - merge(dt, 0.0_wp, a%kicked(i, j, k))*a%cell(i, j, k, d)
             flow%uf(i, j, k, d) = face_mean(low, high) + dt*a%face(i, j, k, d)
           end associate
         end do

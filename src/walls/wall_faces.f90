@@ -156,7 +156,7 @@ contains
       else
         wall = wall_velocity(at_start%motion(:, body), arm)
         gain = dt*a%face(f(1), f(2), f(3), d)
-        if (c_ismac .or. a%given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
+        if (c_ismac .or. a%kicked(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
       r = middle_of_face(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
       o = c + sense*unit_step(:, d)

@@ -104,7 +104,7 @@ contains
     report = coupling_report_t()
     if (.not. begun) then
       coupling%correction = 0.0_wp
-      coupling%given = 0.0_wp
+      coupling%kick = 0.0_wp
     end if
     begun = .false.
     call coupling%average_momentum(stage())

@@ -26,7 +26,7 @@ module test_half_kick_m
   type(merged_cells_t) :: merged
   type(acceleration_t) :: a
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                      1 - n_halo:cells(3) + n_halo, 3) :: before, given
+                      1 - n_halo:cells(3) + n_halo, 3) :: before, kick
   real(wp) :: half(3), expected(3), extrapolated(6, 1) = 0.0_wp
   integer :: i, j, k, seed
 
@@ -55,12 +55,12 @@ contains
       call merged_cells_init(grid, merged)
       call find_merged_cells(grid, box%solid, merged)
       extrapolated(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
-      call find_liquid(grid, flow, a%given)
+      call find_liquid(grid, flow, a%kicked)
       call advect_pressure(grid, fluid%liquid_density*fluid%gravity, box%solid%alpha, box%bodies, &
                            dt, a, flow%p)
       call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
       call find_first_half(grid, box%solid, merged, box%bodies, extrapolated/dt, flow%rho, a)
-      call add_first_half(grid, fluid, dt, a, flow, given)
+      call add_first_half(grid, fluid, dt, a, flow, kick)
       call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
       call check('a cut cell, too', box%solid%alpha(5, 3, 3) > 0.0_wp &
                  .and. maxval(abs(change(5, 3, 3) - half)) < 1.0e-14_wp)
@@ -75,7 +75,7 @@ contains
           do i = 1, cells(1)
             expected = change(i, j, k) &
               *mass_through(fluid, flow%fluid_volume(i, j, k), flow%liquid(i, j, k))
-            call check('the momentum is told', given(i, j, k, :), expected, 1.0e-12_wp)
+            call check('the momentum is told', kick(i, j, k, :), expected, 1.0e-12_wp)
           end do
         end do
       end do

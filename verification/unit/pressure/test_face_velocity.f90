@@ -53,7 +53,7 @@ contains
       end do
     end do
     call fill_velocity_halo(box%grid, box%flow%u)
-    a%given = .true.
+    a%kicked = .true.
     a%in_liquid = .true.
     call short_times()
     call normal_to_the_wall()
@@ -140,11 +140,11 @@ contains
     box%flow%u(7, 4, 5, :) = stream + dt*a%cell(7, 4, 5, :)
     call at_walls()
     call check('next to gas: by the face alone', box%flow%uf(7, 4, 5, 1), expected, 1.0e-11_wp)
-    a%given(7, 4, 5) = .false.
+    a%kicked(7, 4, 5) = .false.
     box%flow%u(7, 4, 5, :) = stream
     call at_walls()
     call check('next to gas: not given yet', box%flow%uf(7, 4, 5, 1), expected, 1.0e-11_wp)
-    a%given(7, 4, 5) = .true.
+    a%kicked(7, 4, 5) = .true.
     box%flow%u(7, 4, 5, :) = stream
     a%in_liquid(7, 4, 5) = .true.
   end subroutine next_to_gas
@@ -161,12 +161,12 @@ contains
     box%flow%u(7, 2, 2, :) = stream + dt*a%cell(7, 2, 2, :)
     call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, none)
     call check('beside gas: given', box%flow%uf(8, 2, 2, 1), expected, tolerance)
-    a%given(8, 2, 2) = .false.
+    a%kicked(8, 2, 2) = .false.
     box%flow%u(8, 2, 2, :) = stream
     call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, none)
     call check('beside gas: not yet given', box%flow%uf(8, 2, 2, 1), expected, tolerance)
     a%in_liquid(f(1), f(2), f(3)) = .true.
-    a%given(8, 2, 2) = .true.
+    a%kicked(8, 2, 2) = .true.
     box%flow%u(7, 2, 2, :) = stream
   end subroutine between_gas
 

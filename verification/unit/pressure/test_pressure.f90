@@ -386,8 +386,8 @@ contains
 
     call build(tank, .false.)
     alpha = box%solid%alpha
-    a%given = .true.
-    a%given(5, 4, 6) = .false.
+    a%kicked = .true.
+    a%kicked(5, 4, 6) = .false.
     box%solid%alpha = 0.0_wp
     call set_bowl(1.0e5_wp)
     before = box%flow%p
@@ -401,7 +401,7 @@ contains
     call carry()
     call check('carried pressure: continued into the body', worst(0.0_wp), 0.0_wp, 1.0e-9_wp)
     box%solid%alpha = 0.0_wp
-    a%given = .true.
+    a%kicked = .true.
     box%bodies%x(3, 1) = 0.02_wp   ! the floor is near
     call set_bowl(0.0_wp)
     box%flow%p = box%flow%p - slope()
@@ -453,7 +453,7 @@ contains
           x = ([i, j, k] - 0.5_wp)*box%grid%h
           arm = x - box%bodies%x(:, 1)
           share = min(1.0_wp, max(0.0_wp, 3.0_wp - 2.0_wp*norm2(arm)/box%bodies%radius(1)))
-          if (.not. a%given(i, j, k)) share = 0.0_wp
+          if (.not. a%kicked(i, j, k)) share = 0.0_wp
           way = share*dt*wall_velocity(box%bodies%motion(:, 1), arm)
           error = max(error, abs(box%flow%p(i, j, k) - dot_product(weight, x) &
                                  - bowl(x - way, curvature)))

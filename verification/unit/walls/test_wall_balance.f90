@@ -36,7 +36,7 @@ module test_wall_balance_m
   type(wall_balance_t) :: balance
   type(rigid_motion_t) :: at_start
   type(acceleration_t) :: a
-  real(wp), allocatable :: given(:, :, :, :)   !! momentum of the first half [kg m/s]
+  real(wp), allocatable :: kick(:, :, :, :)   !! momentum of the first half [kg m/s]
   real(wp) :: force(6, 1)
   integer :: seed = 91, m
 
@@ -50,7 +50,7 @@ contains
     call merged_cells_init(box%grid, merged)
     call find_merged_cells(box%grid, box%solid, merged)
     call acceleration_init(box%grid, a)
-    allocate (given, mold=a%cell)
+    allocate (kick, mold=a%cell)
     call wall_balance_init(balance)
     at_start = box%bodies
     call still_water()
@@ -234,14 +234,14 @@ contains
     integer :: i, j, k
 
     before = merged
-    a%given = .true.
+    a%kicked = .true.
     call begin()
     call fill(a%cell)
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
           mass = box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k)
-          given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+          kick(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
@@ -250,15 +250,15 @@ contains
 
     ! The box was elsewhere; a cell gets no second half.
     call move_box(0.13_wp, before)
-    a%given(6, 4, 5) = .false.
+    a%kicked(6, 4, 5) = .false.
     sums = 0.0_wp
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          call random_numbers(seed, given(i, j, k, :))
+          call random_numbers(seed, kick(i, j, k, :))
           if (max(before%number(i, j, k), merged%number(i, j, k)) == 0) cycle
-          sums = sums - given(i, j, k, :)
-          if (.not. a%given(i, j, k)) cycle
+          sums = sums - kick(i, j, k, :)
+          if (.not. a%kicked(i, j, k)) cycle
           sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k) &
                         *a%cell(i, j, k, :)
         end do
@@ -272,7 +272,7 @@ contains
     type(merged_cells_t), intent(in) :: before
 
     force = force_of_half_kick(box%grid, box%case%fluid, before, merged, box%bodies, dt, box%flow, &
-                               a, given)
+                               a, kick)
   end subroutine find_halves
 
   !> The merged cells of the box lifted by `way`.
