@@ -60,7 +60,7 @@ contains
     first = 1
     do while (first <= len(list))
       last = first + scan(list(first:)//' ', ' ') - 2
-      words = [words, [character(name_length) :: list(first:last)]]
+      words = [character(name_length) :: words, list(first:last)]
       first = last + 2
     end do
   end function words_of

@@ -343,13 +343,15 @@ contains
     character(*), parameter :: allowed = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
     character(:), allocatable :: word
-    integer :: i, j
+    integer :: i, j, n
 
     call self%enter(variable, 'name', meaning, example, required)
     self%entry(self%n)%most = size(words)
     self%entry(self%n)%allowed%fewest = 1
     i = self%lookup()
-    do j = 1, merge(self%group%assignment(max(i, 1))%n, 0, i > 0)
+    n = 0
+    if (i > 0) n = self%group%assignment(i)%n
+    do j = 1, n
       word = ''
       call self%read_text(i, word, j)
       if (len(word) == 0 .or. len(word) > name_length .or. verify(word, allowed) > 0 &
