@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from micstools import cli, extras
-from micstools.pages import run_words
+from micstools.reading import schema
 from micstools.reading.reader import Run
 
 ROOT = Path(__file__).parents[2]
@@ -149,8 +149,8 @@ def test_defaults_are_those_of_the_schema(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as file:
         carried = file.read("micstools/mics-case.schema.json")
     assert carried == (ROOT / "docs" / "mics-case.schema.json").read_bytes()
-    known = run_words._defaults()
-    assert (known["contact"]["friction"], known["run"]["restart_interval"]) == (0.6, 1.0)
+    assert schema.variables("contact")["friction"]["default"] == 0.6
+    assert schema.variables("run")["restart_interval"]["default"] == 1.0
 
 
 @pytest.mark.parametrize("words", [["plot"], ["movie"], ["export", "--to", "pvd"]])
