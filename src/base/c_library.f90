@@ -122,10 +122,10 @@ module c_library_m
     end function c_dup
 
     integer(c_size_t) function c_pread(fd, buffer, count, offset) bind(c, name='pread')
-      import :: c_char, c_int, c_long, c_size_t
+      import :: c_int, c_long, c_ptr, c_size_t
       implicit none
       integer(c_int), value :: fd
-      character(kind=c_char), intent(inout) :: buffer(*)
+      type(c_ptr), value :: buffer
       integer(c_size_t), value :: count
       integer(c_long), value :: offset
     end function c_pread

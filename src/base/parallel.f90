@@ -13,7 +13,7 @@ module parallel_m
   public :: is_root, nproc, my_rank, set_threads, get_threads, spins_for_long
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_accumulators, broadcast
-  public :: set_file_access, set_collective, share_failure
+  public :: set_file_access, set_collective
 
   !> Fill the halos of a block with `width` halo cells on every side.
   !!
@@ -151,14 +151,6 @@ module parallel_m
       integer(i8), intent(in) :: transfer
       integer, intent(out) :: status   !! < 0: failed
     end subroutine set_collective
-
-    !> Has any process failed? One that has waits for the others only for the timeout,
-    !! for the same failure may hold them up.
-    module subroutine share_failure(timeout, failed, answered)
-      real(wp), intent(in) :: timeout      !! [s]
-      logical, intent(inout) :: failed     !! of this process; then of any
-      logical, intent(out) :: answered      !! all have answered
-    end subroutine share_failure
   end interface
 
 contains

@@ -9,7 +9,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
   use mpi_f08, only: MPI_Alloc_mem, MPI_Free_mem, MPI_ADDRESS_KIND
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
-  use mpi_f08, only: MPI_INFO_NULL, MPI_Iallreduce, MPI_Test, MPI_Wtime, MPI_STATUS_IGNORE
+  use mpi_f08, only: MPI_INFO_NULL
   use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use c_library_m, only: c_setenv
@@ -418,22 +418,5 @@ contains
   module procedure set_collective
     call h5pset_dxpl_mpio_f(transfer, H5FD_MPIO_COLLECTIVE_F, status)
   end procedure set_collective
-
-  module procedure share_failure
-    integer, asynchronous :: worst(1)
-    type(MPI_Request) :: request
-    real(wp) :: began, waited
-
-    worst = merge(1, 0, failed)
-    began = MPI_Wtime()
-    call MPI_Iallreduce(MPI_IN_PLACE, worst, 1, MPI_INTEGER, MPI_MAX, MPI_COMM_WORLD, request)
-    do
-      call MPI_Test(request, answered, MPI_STATUS_IGNORE)
-      if (answered) exit
-      waited = MPI_Wtime() - began
-      if (failed .and. waited > timeout) return
-    end do
-    failed = worst(1) > 0
-  end procedure share_failure
 
 end submodule parallel_mpi_m

@@ -118,8 +118,4 @@ contains
     status = merge(0, -1, transfer >= 0)   ! one process writes as ever
   end procedure set_collective
 
-  module procedure share_failure
-    answered = timeout >= 0.0_wp .or. .not. failed   ! the only process has answered
-  end procedure share_failure
-
 end submodule parallel_serial_m

@@ -117,13 +117,14 @@ contains
     class(posix_file_t), intent(in) :: self
     character(:), allocatable :: text
     integer, parameter :: longest = 400
-    character(kind=c_char) :: letter(longest)
+    character(kind=c_char), target :: letter(longest)
+    integer(c_size_t) :: n
 
     text = ''
     if (.not. c_associated(self%stream)) return
     letter = c_null_char
-    if (c_pread(c_fileno(self%stream), letter, int(longest, c_size_t), 0_c_long) > 0) &
-      text = text_of_letters(letter)
+    n = c_pread(c_fileno(self%stream), c_loc(letter), int(longest, c_size_t), 0_c_long)
+    if (n > 0) text = text_of_letters(letter)
   end function content
 
   !> Try to take a lock on the open file; it ends when the file is closed or the program ends.

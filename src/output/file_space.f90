@@ -33,7 +33,7 @@ contains
   subroutine hold(self, path, message, number)
     class(held_file_t), intent(inout) :: self
     character(*), intent(in) :: path
-    character(:), allocatable, intent(out) :: message   !! of an error, else empty
+    character(:), allocatable, intent(out) :: message   !! reason of an error, else empty
     integer(c_int), intent(in), optional :: number
     integer(c_int), parameter :: read_and_write = 2
 
@@ -44,7 +44,7 @@ contains
     else
       self%fd = c_open(path//c_null_char, read_and_write)
     end if
-    if (self%fd < 0) message = path//': cannot open the file: '//system_reason()
+    if (self%fd < 0) message = 'cannot open the file: '//system_reason()
   end subroutine hold
 
   !> Bytes of the file.
@@ -60,7 +60,7 @@ contains
   subroutine lengthen(self, wanted, message)
     class(held_file_t), intent(in) :: self
     integer(i8), intent(in) :: wanted                   !! [bytes]
-    character(:), allocatable, intent(out) :: message   !! of an error, else empty
+    character(:), allocatable, intent(out) :: message   !! reason of an error, else empty
     integer(i8), parameter :: piece = 2**20
     character(:), allocatable :: zeros
     integer(i8) :: before, there, n
@@ -73,7 +73,7 @@ contains
       n = int(c_pwrite(self%fd, zeros, int(min(wanted - there, piece), c_size_t), &
                        int(there, c_long)), i8)
       if (n <= 0) then
-        message = self%path//': cannot write: '//system_reason()
+        message = 'cannot write: '//system_reason()
         call self%shorten(before)
         return
       end if
@@ -94,10 +94,10 @@ contains
   !! that the file is there, and that it will be after a power cut.
   subroutine store(self, message)
     class(held_file_t), intent(in) :: self
-    character(:), allocatable, intent(out) :: message   !! of an error, else empty
+    character(:), allocatable, intent(out) :: message   !! reason of an error, else empty
 
     message = ''
-    if (c_fsync(self%fd) /= 0) message = self%path//': cannot store: '//system_reason()
+    if (c_fsync(self%fd) /= 0) message = 'cannot store: '//system_reason()
   end subroutine store
 
   !> Delete the file; it gives its room back at once.

@@ -1,370 +1,360 @@
-!> The result file as its writers know it, and its columns, the datasets that grow by rows.
-!!
-!! `h5_file_t` has what is in `hdf5_handle_m` (the file; what happens on an error and who calls),
-!! `hdf5_attributes_m` and `hdf5_datasets_m`; here come the columns.
+!> Datasets of an HDF5 file that have one shape for good: stored and read as a whole, or by blocks.
 module hdf5_file_m
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
-  use hdf5, only: hid_t, hsize_t, h5dopen_f, h5dread_f, h5dset_extent_f, h5dwrite_f
-  use hdf5, only: h5dget_create_plist_f, h5pget_chunk_f, h5pget_nfilters_f, h5pclose_f
-  use hdf5, only: h5pcreate_f, h5pset_chunk_f, h5pset_alloc_time_f, h5pset_deflate_f
-  use hdf5, only: h5pset_fill_value_f, h5pset_fletcher32_f, h5pset_shuffle_f, H5D_ALLOC_TIME_EARLY_F
-  use hdf5, only: H5P_DATASET_CREATE_F, H5T_NATIVE_REAL
-  use kinds_m, only: wp, sp, i8
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_char, c_null_char
+  use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND
+  use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f
+  use hdf5, only: h5dwrite_f, H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F
+  use hdf5, only: h5pclose_f, h5pcreate_f, h5pset_fill_time_f
+  use hdf5, only: h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f
+  use hdf5, only: h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f
+  use hdf5, only: H5S_SELECT_SET_F, H5S_UNLIMITED_F
+  use hdf5, only: h5tclose_f, h5tcopy_f, h5tget_size_f, h5tset_size_f, h5tset_strpad_f
+  use hdf5, only: H5T_C_S1, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STR_NULLPAD_F
+  use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root
-  use file_space_m, only: bytes_for_chunks
-  use hdf5_kinds_m, only: file_real64, file_real32, file_integer32, file_integer64, bytes_of
-  use hdf5_kinds_m, only: type_in_file, memory_type
-  use hdf5_datasets_m, only: h5_datasets_t, max_rank, close_selection
+  use hdf5_handle_m, only: h5_handle_t
   implicit none
   private
-  public :: h5_file_t, h5_column_t
-  public :: file_real64, file_real32, file_integer32, file_integer64
+  public :: h5_file_t
 
-  integer, parameter :: deflate_level = 1   !! higher levels cost time and gain little on fields
+  integer, parameter :: max_rank = 5
 
-  !> A dataset that grows by rows; its last index (first for h5py) is the row.
-  type :: h5_column_t
-    character(:), allocatable :: name
-    integer(hid_t) :: id = -1
-    integer :: rank = 0                            !! with the row index
-    integer(hsize_t) :: extent(max_rank) = 1       !! of a row; extent(rank) is the number of rows
-    integer(hsize_t) :: chunk(max_rank) = 1        !! shape of the pieces that are stored
-    integer :: kind = 0
-    logical :: compressed = .false.
+  !> A file with its datasets.
+  type, extends(h5_handle_t) :: h5_file_t
   contains
-    procedure :: bytes_for
-  end type h5_column_t
-
-  !> A file with all that a writer or reader asks of it.
-  type, extends(h5_datasets_t) :: h5_file_t
-  contains
-    procedure :: new_column, new_compressed_column, open_column, resize
-    procedure :: append, append_rows, append_integers, append_wide, append_block
-    procedure :: read_row, count_rows
-    procedure, private :: transfer_rows
+    procedure, private :: store_reals, store_integers, store_texts
+    procedure, private :: read_reals, read_integers, read_texts
+    generic :: store => store_reals, store_integers, store_texts
+    generic :: read => read_reals, read_integers, read_texts
+    procedure :: store_wide_integers, shape_of, new_blocks, write_block, read_block
+    procedure :: new_dataset, find, select   ! for columns
   end type h5_file_t
 
 contains
 
-  !> Create a column without rows, in chunks of `chunk_rows` rows that are written in place at once.
-  !! Rows are `row` in shape, for h5py (rows, reversed row).
-  subroutine new_column(self, name, units, kind, row, chunk_rows, column)
+  !> A whole dataset of reals with its unit; one that exists is overwritten. h5py shows the reverse
+  !! of its shape.
+  subroutine store_reals(self, name, units, a, extent)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in) :: kind         !! file_real64, ...
-    integer, intent(in) :: row(:)       !! shape of a row; empty: a number
-    integer, intent(in) :: chunk_rows
-    type(h5_column_t), intent(out) :: column
-
-    if (self%info /= 0) return
-    column = empty_column(name, kind, row, chunk_rows)
-    call create_column(self, units, column)
-  end subroutine new_column
-
-  !> Create a column that is compressed; a row must be written whole.
-  subroutine new_compressed_column(self, name, units, kind, row, chunk, column)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in) :: kind           !! file_real64, ...
-    integer, intent(in) :: row(:)         !! shape of a row, not empty
-    integer, intent(in) :: chunk(2)       !! of the `row(size(row))` layers of a row, rows
-    type(h5_column_t), intent(out) :: column
-
-    if (self%info /= 0) return
-    column = empty_column(name, kind, row, chunk(2))
-    column%compressed = .true.
-    column%chunk(size(row)) = int(min(chunk(1), row(size(row))), hsize_t)
-    call create_column(self, units, column)
-  end subroutine new_compressed_column
-
-  !> A column that is not in the file yet, in chunks of whole rows.
-  pure function empty_column(name, kind, row, chunk_rows) result(column)
-    character(*), intent(in) :: name
-    integer, intent(in) :: kind, row(:), chunk_rows
-    type(h5_column_t) :: column
-
-    column%name = name
-    column%kind = kind
-    column%rank = size(row) + 1
-    column%extent(:column%rank) = int([row, 0], hsize_t)
-    column%chunk(:column%rank) = int([max(1, row), chunk_rows], hsize_t)
-  end function empty_column
-
-  !> Create a column in the file as it is described.
-  subroutine create_column(self, units, column)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: units
-    type(h5_column_t), intent(inout) :: column
-    character(:), allocatable :: what
-    integer(hid_t) :: list
-    integer :: status
-
-    what = 'create '//column%name
-    call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
-    call self%check(status, what)
-    call h5pset_chunk_f(list, column%rank, column%chunk(:column%rank), status)
-    call self%check(status, what)
-    if (column%compressed) then
-      call h5pset_shuffle_f(list, status)
-      call self%check(status, what)
-      call h5pset_deflate_f(list, deflate_level, status)
-      call self%check(status, what)
-      call h5pset_fletcher32_f(list, status)   ! a chunk that was changed on the disk is not read
-      call self%check(status, what)
-      call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status)   ! as many processes need it
-      call self%check(status, what)
-    end if
-    call set_fill(self, column%name, column%kind, list)
-    call self%new_dataset(column%name, units, type_in_file(column%kind), &
-                          column%extent(:column%rank), list, column%id)
-    call h5pclose_f(list, status)
-  end subroutine create_column
-
-  !> What a row that never arrived shows: NaN, or -1 for integers.
-  subroutine set_fill(self, name, kind, list)
-    use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: kind
-    integer(hid_t), intent(in) :: list
-    real(wp), target :: nothing
-    real(sp), target :: nothing_single
-    integer, target :: none
-    type(c_ptr) :: value
-    integer :: status
-
-    nothing = ieee_value(nothing, ieee_quiet_nan)
-    nothing_single = ieee_value(nothing_single, ieee_quiet_nan)
-    none = -1
-    select case (kind)
-    case (file_real64); value = c_loc(nothing)
-    case (file_real32); value = c_loc(nothing_single)
-    case default; value = c_loc(none)
-    end select
-    call h5pset_fill_value_f(list, memory_type(merge(file_integer32, kind, &
-      kind == file_integer64)), value, &
-                             status)
-    call self%check(status, 'create '//name)
-  end subroutine set_fill
-
-  !> Open a column of a file that exists.
-  subroutine open_column(self, name, kind, column)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: kind
-    type(h5_column_t), intent(out) :: column
-    integer(hid_t) :: list
-    integer :: status, filters
-
-    if (self%info /= 0) return
-    column%name = name
-    column%kind = kind
-    call h5dopen_f(self%id, name, column%id, status)
-    call self%check(status, 'open '//name)
-    if (self%info /= 0) return
-    call self%get_extent(name, column%id, column%rank, column%extent)
-    call h5dget_create_plist_f(column%id, list, status)
-    call self%check(status, 'open '//name)
-    if (self%info /= 0) return
-    call h5pget_chunk_f(list, column%rank, column%chunk(:column%rank), status)
-    call self%check(status, 'open '//name)
-    call h5pget_nfilters_f(list, filters, status)
-    call self%check(status, 'open '//name)
-    column%compressed = filters > 0
-    call h5pclose_f(list, status)
-  end subroutine open_column
-
-  !> Most that `n` more rows take at the end of the file [bytes].
-  pure function bytes_for(column, n) result(bytes)
-    class(h5_column_t), intent(in) :: column
-    integer, intent(in) :: n   !! rows
-    integer(i8) :: bytes
-    integer(i8) :: layers, before, after
-
-    bytes = 0
-    if (column%rank == 0) return   ! of a file that failed
-    associate (r => column%rank, extent => int(column%extent, i8), chunk => int(column%chunk, i8))
-      layers = product((extent(:r - 1) + chunk(:r - 1) - 1)/chunk(:r - 1))
-      before = layers*((extent(r) + chunk(r) - 1)/chunk(r))
-      after = layers*((extent(r) + n + chunk(r) - 1)/chunk(r))
-      bytes = bytes_for_chunks(product(chunk(:r))*bytes_of(column%kind), column%compressed, &
-        before, after - before, r)
-    end associate
-  end function bytes_for
-
-  !> Give a column this many rows: later ones are dropped, missing ones have the fill value.
-  subroutine resize(self, column, rows)
-    class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer(i8), intent(in) :: rows
-    integer :: status
-
-    if (self%info /= 0) return
-    column%extent(column%rank) = int(rows, hsize_t)
-    call h5dset_extent_f(column%id, column%extent(:column%rank), status)
-    call self%check(status, 'write '//column%name)
-    call self%agree()
-  end subroutine resize
-
-  !> Append a row of reals, its elements in a row; of a shared file the root process writes it.
-  subroutine append(self, column, a)
-    class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    real(wp), intent(in) :: a(:)
-
-    call self%append_rows(column, 1, a)
-  end subroutine append
-
-  !> Append several rows of reals, their elements in a row.
-  subroutine append_rows(self, column, n, a)
-    class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer, intent(in) :: n      !! rows
-    real(wp), intent(in) :: a(:)
+    real(wp), intent(in) :: a(:)                 !! its elements in a row
+    integer, intent(in), optional :: extent(:)   !! its shape, else it is a row
     real(wp), target :: copy(max(1, size(a)))
-    real(sp), target :: single(max(1, size(a)))
 
-    if (self%info /= 0) return
-    if (column%kind == file_real32) then
-      single(:size(a)) = real(a, sp)
-      call self%transfer_rows(column, memory_type(file_real32), n, size(a), c_loc(single))
-    else
-      copy(:size(a)) = a
-      call self%transfer_rows(column, memory_type(file_real64), n, size(a), c_loc(copy))
-    end if
-  end subroutine append_rows
-
-  !> Append a row of integers, or several, their elements in a row.
-  subroutine append_integers(self, column, a, n)
-    class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer, intent(in) :: a(:)
-    integer, intent(in), optional :: n   !! rows, else one
-    integer, target :: copy(max(1, size(a)))
-    integer :: rows
-
-    if (self%info /= 0) return
     copy(:size(a)) = a
-    rows = 1
-    if (present(n)) rows = n
-    call self%transfer_rows(column, memory_type(file_integer32), rows, size(a), c_loc(copy))
-  end subroutine append_integers
+    call put(self, name, units, H5T_NATIVE_DOUBLE, shape_or(extent, size(a)), c_loc(copy))
+  end subroutine store_reals
 
-  !> Append a row of integers of 64 bits.
-  subroutine append_wide(self, column, a)
+  subroutine store_integers(self, name, units, a, extent)
     class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer(i8), intent(in) :: a(:)
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: a(:)
+    integer, intent(in), optional :: extent(:)
+    integer, target :: copy(max(1, size(a)))
+
+    copy(:size(a)) = a
+    call put(self, name, units, H5T_NATIVE_INTEGER, shape_or(extent, size(a)), c_loc(copy))
+  end subroutine store_integers
+
+  !> Integers of 64 bits, the kind that VTK uses for numbers of points and cells.
+  subroutine store_wide_integers(self, name, units, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: a(:)
     integer(i8), target :: copy(max(1, size(a)))
 
+    copy(:size(a)) = int(a, i8)
+    call put(self, name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [size(a, kind=hsize_t)], &
+             c_loc(copy))
+  end subroutine store_wide_integers
+
+  !> Texts, each as long as the longest of them.
+  subroutine store_texts(self, name, units, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    character(*), intent(in) :: a(:)
+    character(kind=c_char), target :: letters(max(1, size(a)*len(a)))
+    integer(hid_t) :: text_type
+    integer :: status, i, j, width
+
     if (self%info /= 0) return
-    copy(:size(a)) = a
-    call self%transfer_rows(column, memory_type(file_integer64), 1, size(a), c_loc(copy))
-  end subroutine append_wide
+    width = max(1, maxval([0, len_trim(a)]))
+    do i = 1, size(a)
+      do j = 1, width
+        letters(j + (i - 1)*width) = merge(c_null_char, a(i)(j:j), j > len_trim(a(i)))
+      end do
+    end do
+    call make_text_type(width, text_type)
+    call put(self, name, units, text_type, [size(a, kind=hsize_t)], c_loc(letters))
+    call h5tclose_f(text_type, status)
+  end subroutine store_texts
 
-  !> Make a column n rows longer and fill them from the root process.
-  subroutine transfer_rows(self, column, mem_type, n, elements, data)
+  subroutine make_text_type(width, text_type)
+    integer, intent(in) :: width
+    integer(hid_t), intent(out) :: text_type
+    integer :: status
+
+    call h5tcopy_f(H5T_C_S1, text_type, status)
+    call h5tset_size_f(text_type, int(width, size_t), status)
+    call h5tset_strpad_f(text_type, H5T_STR_NULLPAD_F, status)
+  end subroutine make_text_type
+
+  pure function shape_or(extent, n) result(found)
+    integer, intent(in), optional :: extent(:)
+    integer, intent(in) :: n   !! elements
+    integer(hsize_t), allocatable :: found(:)
+
+    found = [int(n, hsize_t)]
+    if (present(extent)) found = int(extent, hsize_t)
+  end function shape_or
+
+  !> Write a whole dataset; of a shared file the root process fills it.
+  subroutine put(self, name, units, type, extent, data)
     class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer(hid_t), intent(in) :: mem_type
-    integer, intent(in) :: n, elements
+    character(*), intent(in) :: name, units
+    integer(hid_t), intent(in) :: type
+    integer(hsize_t), intent(in) :: extent(:)
     type(c_ptr), intent(in) :: data
-    integer(hsize_t) :: first(max_rank), extent(max_rank)
-    integer(hid_t) :: there, here
+    integer(hid_t) :: id
     integer :: status
 
-    first = 0
-    first(column%rank) = column%extent(column%rank)
-    call self%resize(column, int(column%extent(column%rank), i8) + n)
-    if (elements > 0 .and. (is_root() .or. .not. self%shared)) then
-      extent = column%extent
-      extent(column%rank) = int(n, hsize_t)
-      call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, &
-        here)
-      if (self%info == 0) then
-        call h5dwrite_f(column%id, mem_type, data, status, here, there)
-        call self%check(status, 'write '//column%name)
-        call close_selection(there, here)
-      end if
+    if (self%has(name)) then
+      call h5dopen_f(self%id, name, id, status)
+      call self%check(status, 'open '//name)
+    else
+      call self%new_dataset(name, units, type, extent, H5P_DEFAULT_F, id)
     end if
-    call self%agree()
-  end subroutine transfer_rows
+    if (self%info /= 0) return
+    if (product(extent) > 0 .and. (is_root() .or. .not. self%shared)) then
+      call h5dwrite_f(id, type, data, status)
+      call self%check(status, 'write '//name)
+    end if
+    call h5dclose_f(id, status)
+  end subroutine put
 
-  !> Append a row of 32-bit reals of which this process gives the block `first : first + extent -
-  !! 1`; all processes together in a shared file. The kind in memory must be that of the file: HDF5
-  !! does not convert what it compresses for several processes.
-  subroutine append_block(self, column, first, extent, a)
+  !> Create a dataset of any type, with its unit; `list` of a growing one says how it is cut.
+  subroutine new_dataset(self, name, units, type, extent, list, id)
     class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(inout) :: column
-    integer, intent(in) :: first(:), extent(:)
-    real(sp), intent(in), target, contiguous :: a(:)   !! the block's elements in a row
-    integer(hid_t) :: there, here
+    character(*), intent(in) :: name, units
+    integer(hid_t), intent(in) :: type
+    integer(hsize_t), intent(in) :: extent(:)
+    integer(hid_t), intent(in) :: list     !! H5P_DEFAULT_F: the shape never changes
+    integer(hid_t), intent(out) :: id
+    integer(hsize_t) :: largest(size(extent))
+    integer(hid_t) :: space
     integer :: status
 
-    call self%resize(column, int(column%extent(column%rank), i8) + 1_i8)
-    call self%select(column%name, column%id, &
-                     [int(first - 1, hsize_t), column%extent(column%rank) - 1], &
-                     [int(extent, hsize_t), 1_hsize_t], there, here)
-    if (self%info == 0) then
-      call h5dwrite_f(column%id, H5T_NATIVE_REAL, c_loc(a), status, here, there, self%collective)
-      call self%check(status, 'write '//column%name)
-      call close_selection(there, here)
+    id = -1
+    if (self%info /= 0) return
+    largest = extent
+    if (list /= H5P_DEFAULT_F) then
+      where (extent == 0) largest = H5S_UNLIMITED_F
     end if
-    call self%agree()
-  end subroutine append_block
+    call h5screate_simple_f(size(extent), extent, space, status, largest)
+    call h5dcreate_f(self%id, name, type, space, id, status, list)
+    call self%check(status, 'create '//name)
+    if (self%info == 0) call h5sclose_f(space, status)
+    call self%attribute(name, 'units', units)
+  end subroutine new_dataset
 
-  !> Row number `row` (from 1) of a column of reals.
-  subroutine read_row(self, column, row, a)
+  !> All elements of a dataset, in a row; their number must be right.
+  subroutine read_reals(self, name, a)
     class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(in) :: column
-    integer, intent(in) :: row
+    character(*), intent(in) :: name
     real(wp), intent(inout) :: a(:)
     real(wp), target :: copy(max(1, size(a)))
-    integer(hsize_t) :: first(max_rank), extent(max_rank)
-    integer(hid_t) :: there, here
+
+    call get(self, name, H5T_NATIVE_DOUBLE, size(a), c_loc(copy))
+    if (self%info == 0) a = copy(:size(a))
+  end subroutine read_reals
+
+  subroutine read_integers(self, name, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(inout) :: a(:)
+    integer, target :: copy(max(1, size(a)))
+
+    call get(self, name, H5T_NATIVE_INTEGER, size(a), c_loc(copy))
+    if (self%info == 0) a = copy(:size(a))
+  end subroutine read_integers
+
+  !> All texts of a dataset, cut or filled to the length of `a`.
+  subroutine read_texts(self, name, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    character(name_length), intent(inout) :: a(:)
+    character(kind=c_char), target :: letters(max(1, size(a)*len(a)))
+    integer(hid_t) :: text_type
+    integer :: status, i, j
+
+    if (self%info /= 0) return
+    call make_text_type(len(a), text_type)
+    call get(self, name, text_type, size(a), c_loc(letters))
+    call h5tclose_f(text_type, status)
+    if (self%info /= 0) return
+    a = ''
+    do i = 1, size(a)
+      do j = 1, len(a)
+        if (letters(j + (i - 1)*len(a)) == c_null_char) exit
+        a(i)(j:j) = letters(j + (i - 1)*len(a))
+      end do
+    end do
+  end subroutine read_texts
+
+  !> Read a whole dataset of n elements.
+  subroutine get(self, name, type, n, data)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(hid_t), intent(in) :: type
+    integer, intent(in) :: n
+    type(c_ptr), intent(in) :: data
+    integer(hsize_t), allocatable :: extent(:)
+    integer(hid_t) :: id
+    type(c_ptr) :: there
+    integer :: status
+
+    call self%find(name, type, id, extent)
+    if (self%info /= 0) return
+    if (product(extent) /= int(n, hsize_t)) then
+      call self%fail(name//' has another size than this case needs')
+    else if (n > 0) then
+      there = data
+      call h5dread_f(id, type, there, status)
+      call self%check(status, 'read '//name)
+    end if
+    call h5dclose_f(id, status)
+  end subroutine get
+
+  !> Open a dataset. Elements larger than any number and than what is to be read are refused: in a
+  !! damaged file they make the library read past its buffers.
+  subroutine find(self, name, type, id, extent)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(hid_t), intent(in) :: type                        !! of what is to be read
+    integer(hid_t), intent(out) :: id
+    integer(hsize_t), allocatable, intent(out) :: extent(:)   !! x fastest; h5py shows the reverse
+    integer(size_t), parameter :: largest_number = 16   ! [B]
+    integer(hsize_t) :: now(max_rank), largest(max_rank)
+    integer(size_t) :: in_file, asked
+    integer(hid_t) :: space, file_type
+    integer :: status, rank
+
+    id = -1
+    extent = [integer(hsize_t) ::]
+    if (self%info /= 0) return
+    call h5dopen_f(self%id, name, id, status)
+    call self%check(status, 'open '//name)
+    if (self%info /= 0) return
+    call h5dget_space_f(id, space, status)
+    call h5sget_simple_extent_ndims_f(space, rank, status)
+    call self%check(merge(status, -1, rank <= max_rank), 'open '//name)
+    if (self%info /= 0) return
+    call h5sget_simple_extent_dims_f(space, now(:rank), largest(:rank), status)
+    call self%check(status, 'open '//name)
+    extent = now(:rank)
+    call h5sclose_f(space, status)
+    call h5dget_type_f(id, file_type, status)
+    call self%check(status, 'read '//name)
+    if (self%info /= 0) return
+    call h5tget_size_f(file_type, in_file, status)
+    call h5tget_size_f(type, asked, status)
+    call h5tclose_f(file_type, status)
+    if (in_file <= max(asked, largest_number)) return
+    call self%fail(name//' has elements of a size that no number has')
+  end subroutine find
+
+  !> Extents of a dataset, x fastest.
+  subroutine shape_of(self, name, found)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, allocatable, intent(out) :: found(:)
+    integer(hsize_t), allocatable :: extent(:)
+    integer(hid_t) :: id
+    integer :: status
+
+    call self%find(name, H5T_NATIVE_DOUBLE, id, extent)
+    found = int(min(extent, int(huge(0), hsize_t)))
+    if (self%info == 0) call h5dclose_f(id, status)
+  end subroutine shape_of
+
+  !> Create a dataset of doubles that all processes fill block by block; zero where none is written.
+  subroutine new_blocks(self, name, units, extent)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: extent(:)
+    integer(hid_t) :: id, list
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
+    call h5pset_fill_time_f(list, H5D_FILL_TIME_ALLOC_F, status)
+    call self%new_dataset(name, units, H5T_NATIVE_DOUBLE, int(extent, hsize_t), list, id)
+    call h5pclose_f(list, status)
+    if (self%info == 0) call h5dclose_f(id, status)
+  end subroutine new_blocks
+
+  !> Write the block `first : first + extent - 1` of a dataset of `new_blocks`; all processes
+  !! together in a shared file.
+  subroutine write_block(self, name, first, extent, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: first(:), extent(:)
+    real(wp), intent(in), target, contiguous :: a(:)   !! the block's elements in a row
+    integer(hid_t) :: id, there, here
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5dopen_f(self%id, name, id, status)
+    call self%check(status, 'open '//name)
+    call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
+    if (self%info /= 0) return
+    call h5dwrite_f(id, H5T_NATIVE_DOUBLE, c_loc(a), status, here, there, self%transfer)
+    call self%check(status, 'write '//name)
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+    call h5dclose_f(id, status)
+  end subroutine write_block
+
+  !> Read the block `first : first + extent - 1` of a dataset of reals.
+  subroutine read_block(self, name, first, extent, a)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: first(:), extent(:)
+    real(wp), intent(inout), target, contiguous :: a(:)
+    integer(hsize_t), allocatable :: whole(:)
+    integer(hid_t) :: id, there, here
     type(c_ptr) :: data
     integer :: status
 
-    if (self%info /= 0 .or. size(a) == 0) return
-    first = 0
-    first(column%rank) = int(row - 1, hsize_t)
-    extent = column%extent
-    extent(column%rank) = 1
-    call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, here)
+    call self%find(name, H5T_NATIVE_DOUBLE, id, whole)
+    call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
     if (self%info /= 0) return
-    data = c_loc(copy)
-    call h5dread_f(column%id, memory_type(file_real64), data, status, here, there)
-    call self%check(status, 'read '//column%name)
-    call close_selection(there, here)
-    a = copy(:size(a))
-  end subroutine read_row
+    data = c_loc(a)
+    call h5dread_f(id, H5T_NATIVE_DOUBLE, data, status, here, there)
+    call self%check(status, 'read '//name)
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+    call h5dclose_f(id, status)
+  end subroutine read_block
 
-  !> How many rows of a column of times a run keeps that goes on: those that it has counted, and one
-  !! more if that one is of this very time.
-  subroutine count_rows(self, column, counted, time, rows, up_to_date)
+  !> Select a block of a dataset and describe it in memory.
+  subroutine select(self, name, id, first, extent, there, here)
     class(h5_file_t), intent(inout) :: self
-    type(h5_column_t), intent(in) :: column
-    integer, intent(in) :: counted
-    real(wp), intent(in) :: time        !! [s]
-    integer, intent(out) :: rows
-    logical, intent(out) :: up_to_date  !! the last row kept is of this very time
-    real(wp) :: last(1)
-    integer :: row
+    character(*), intent(in) :: name
+    integer(hid_t), intent(in) :: id
+    integer(hsize_t), intent(in) :: first(:)    !! from 0
+    integer(hsize_t), intent(in) :: extent(:)
+    integer(hid_t), intent(out) :: there, here  !! in the file, in memory
+    integer :: status
 
-    rows = counted
-    up_to_date = .false.
+    there = -1
+    here = -1
     if (self%info /= 0) return
-    if (column%extent(column%rank) < int(counted, hsize_t)) then
-      self%info = 1
-      self%message = self%path//': has lost rows, the run cannot go on in it'
-      return
-    end if
-    do row = max(1, counted), min(counted + 1, int(column%extent(column%rank)))
-      call self%read_row(column, row, last)
-      if (self%info /= 0 .or. abs(last(1) - time) > 0.0_wp) cycle
-      rows = row
-      up_to_date = .true.
-    end do
-  end subroutine count_rows
+    call h5dget_space_f(id, there, status)
+    call h5sselect_hyperslab_f(there, H5S_SELECT_SET_F, first, extent, status)
+    call self%check(status, 'select a part of '//name)
+    call h5screate_simple_f(size(extent), extent, here, status)
+    call self%check(status, 'select a part of '//name)
+  end subroutine select
 
 end module hdf5_file_m

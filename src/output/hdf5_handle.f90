@@ -1,29 +1,42 @@
-!> An HDF5 file as such: opened and closed, flushed, given room, asked what it holds.
+!> An HDF5 file: opened and closed, given room; its groups and attributes. Datasets of one shape are
+!! in `hdf5_file_m`, columns, which grow by rows, in `table_m`.
 !!
-!! Every status of HDF5 is looked at. The first error sets `info` and a `message` that names the
-!! file, the dataset and the reason; from then on every procedure of that file returns at once, so a
-!! caller may write a whole group of things and look at `info` once, before anything that waits for
-!! others.
+!! The first error sets `info` and a `message` that names the file, the dataset and the reason; from
+!! then on every procedure of that file returns at once, so a caller may write a whole group of
+!! things and look at `info` once, before anything that waits for others.
 !!
-!! A `shared` file is opened by all processes together: every procedure is then called by all of
-!! them, and blocks of cells are written collectively. Any other file, and all files of a run on one
-!! process, belong to the process that opens them.
+!! A file belongs to the process that opens it. One that is `shared` is written by all processes
+!! together: every procedure is then called by all of them, arrays and rows come from the root
+!! process, and blocks of cells are written collectively. What the root process does alone there, to
+!! create the file and to give it room, is an error of all; any other error ends the run at once,
+!! since the others may be waiting inside MPI.
 !!
 !! The files keep the oldest format and no locks, and columns without compression never move a chunk
 !! once it is there: a file that was flushed opens again whatever happens to the program. Whoever
 !! changes such a file reserves its space first (`reserve`). A file is left as it is on the
 !! disk, without the changes that HDF5 still keeps in memory, once HDF5 has failed to write to it.
+!!
+!! The High-Level library of HDF5 is not used: its attributes are neither single values nor texts
+!! of any length, and it loses the reason of an error.
 module hdf5_handle_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_f_pointer
-  use hdf5, only: hid_t, hsize_t, size_t, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f
-  use hdf5, only: h5fopen_f, h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f, h5pclose_f
-  use hdf5, only: h5pcreate_f, h5pset_cache_f, h5pset_fclose_degree_f, H5F_ACC_RDONLY_F
-  use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_EXCL_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
-  use hdf5, only: H5P_DATASET_XFER_F, H5P_DEFAULT_F, H5P_FILE_ACCESS_F
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_loc, c_char, c_null_char, &
+    c_f_pointer
+  use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND, H5P_DEFAULT_F
+  use hdf5, only: h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fopen_f
+  use hdf5, only: h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f
+  use hdf5, only: h5pclose_f, h5pcreate_f, h5pset_cache_f, h5pset_fclose_degree_f
+  use hdf5, only: H5F_ACC_EXCL_F, H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_CLOSE_STRONG_F
+  use hdf5, only: H5F_SCOPE_LOCAL_F, H5P_DATASET_XFER_F, H5P_FILE_ACCESS_F
+  use hdf5, only: h5aclose_f, h5acreate_f, h5aexists_f, h5aget_type_f
+  use hdf5, only: h5aopen_by_name_f, h5aopen_f, h5aread_f, h5awrite_f, h5oclose_f, h5oopen_f
+  use hdf5, only: h5sclose_f, h5screate_f, h5screate_simple_f, H5S_SCALAR_F
+  use hdf5, only: h5tclose_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f
+  use hdf5, only: H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_NATIVE_DOUBLE, H5T_STRING
+  use c_library_m, only: text_at
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, exit_files
-  use parallel_m, only: is_root, my_rank, nproc, set_file_access, set_collective, global_max
-  use parallel_m, only: global_min, broadcast, share_failure
+  use parallel_m, only: is_root, nproc, set_file_access, set_collective, broadcast, &
+    global_max
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   use posix_file_m, only: is_pipe
   use file_space_m, only: held_file_t
@@ -31,30 +44,32 @@ module hdf5_handle_m
   private
   public :: h5_handle_t
 
-  !> What `hdf5_attributes_m`, `hdf5_datasets_m` and `hdf5_file_m` extend, in this order.
+  integer(hsize_t), parameter :: single_value(0) = [integer(hsize_t) ::]   ! extent of a number
+
   type :: h5_handle_t
     character(:), allocatable :: path
+    integer :: info = 0                      !! 0: no error so far
+    character(:), allocatable :: message     !! file, dataset and reason of the first error
     logical :: shared = .false.
-    integer :: info = 0                    !! 0: no error so far
-    character(:), allocatable :: message   !! file, dataset and reason of the first error
-    ! Only for the modules that extend this type:
-    logical :: broken = .false.            !! HDF5 failed: what it has in memory is not to be used
     integer(hid_t) :: id = -1
-    integer(hid_t) :: collective = -1      !! transfer list of blocks of cells
+    integer(hid_t) :: transfer = -1          !! how blocks of cells are written
     logical, private :: writing = .false.
+    logical, private :: broken = .false.     !! what HDF5 has in memory is not to be used
     logical, private :: complete = .false.   !! it was whole on the disk at least once
     type(held_file_t), private :: held       !! while it is written
   contains
     procedure :: create => file_create
     procedure :: open => file_open
     procedure :: close => file_close
-    procedure :: abandon
     procedure :: flush => file_flush
-    procedure :: reserve
-    procedure :: group => file_group
-    procedure :: has => file_has
-    procedure :: remove => file_remove
-    procedure :: check, agree
+    procedure :: reserve, check, fail
+    procedure :: group, has, remove
+    procedure, private :: attribute_text, attribute_integer, attribute_integers, attribute_real
+    procedure, private :: attribute_reals, read_text_attribute, read_integer_attribute
+    generic :: attribute => attribute_text, attribute_integer, attribute_integers, attribute_real, &
+      attribute_reals
+    generic :: read_attribute => read_text_attribute, read_integer_attribute
+    procedure :: fixed_text_attribute, last_integer
   end type h5_handle_t
 
   interface
@@ -77,57 +92,22 @@ contains
     character(*), intent(in) :: what   !! like 'write /series/time'
 
     if (status >= 0 .or. self%info /= 0) return
-    self%info = 1
-    self%broken = .true.
-    self%message = self%path//': cannot '//what//': '//hdf5_reason()
+    call self%fail('cannot '//what//': '//hdf5_reason())
   end subroutine check
 
-  !> An error of one process of a shared file becomes that of all.
-  !!
-  !! A process that failed may find that the others wait for it inside MPI (seen with a full disk):
-  !! then nothing is left but to end them all, though this is a lower procedure.
-  subroutine agree(self)
+  !> The same for a reason of our own.
+  subroutine fail(self, reason)
     class(h5_handle_t), intent(inout) :: self
-    real(wp), parameter :: timeout = 3.0_wp   ! [s]
-    logical :: failed, answered
+    character(*), intent(in) :: reason
 
-    if (.not. self%shared) return
-    if (self%info /= 0 .and. .not. self%broken) return   ! all have the reason
-    failed = self%info /= 0
-    call share_failure(timeout, failed, answered)
-    if (.not. answered) then
-      call leave(self)
-      call fatal(exit_files, self%message)
-    end if
-    if (failed) call share_message(self)
-  end subroutine agree
-
-  !> Give all processes the message of the first one that failed.
-  subroutine share_message(self)
-    class(h5_handle_t), intent(inout) :: self
-    integer, parameter :: longest = 500
-    real(wp) :: first(1), letter(longest)
-    integer :: i
-
-    first = huge(1.0_wp)
-    if (self%info /= 0) first = real(my_rank(), wp)
-    call global_min(first)
-    letter = 0.0_wp
-    if (nint(first(1)) == my_rank()) then
-      do i = 1, min(longest, len(self%message))
-        letter(i) = real(ichar(self%message(i:i)), wp)
-      end do
-    end if
-    call global_max(letter)
     self%info = 1
     self%broken = .true.
-    self%message = repeat(' ', count(letter > 0.0_wp))
-    do i = 1, len(self%message)
-      self%message(i:i) = char(nint(letter(i)))
-    end do
-  end subroutine share_message
+    self%message = self%path//': '//reason
+    if (self%shared) call fatal(exit_files, self%message)
+  end subroutine fail
 
-  !> Create an empty file; one that exists is an error, whoever made it.
+  !> Create an empty file; one that exists is an error, whoever made it. One that all processes are
+  !! to write together is created by the root process.
   subroutine file_create(self, path, shared)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: path
@@ -135,59 +115,46 @@ contains
     integer(hid_t) :: access
     integer :: status
 
-    call begin_file(self, path, shared, access)
-    self%writing = .true.
+    self%info = 0
+    self%message = ''
+    if (is_root() .or. .not. shared) then
+      call begin_file(self, path, .false., access)
+      self%writing = .true.
+      if (self%info == 0) then
+        call h5fcreate_f(path, H5F_ACC_EXCL_F, self%id, status, access_prp=access)
+        call self%check(status, 'create the file')
+        call h5pclose_f(access, status)
+        call hold_file(self)
+      end if
+    end if
+    if (.not. shared .or. nproc() == 1) return
+    if (is_root()) call self%close()
+    call broadcast(self%info)
     if (self%info /= 0) return
-    call h5fcreate_f(path, H5F_ACC_EXCL_F, self%id, status, access_prp=access)
-    call self%check(status, 'create the file')
-    call h5pclose_f(access, status)
-    call hold_file(self)
-    call self%agree()
+    call self%open(path, .true., .true.)
+    self%complete = .false.
   end subroutine file_create
 
   !> Open a file that exists.
   subroutine file_open(self, path, shared, writing)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: path
-    logical, intent(in) :: shared    !! all processes call
+    logical, intent(in) :: shared    !! all processes call, to write
     logical, intent(in) :: writing
     integer(hid_t) :: access
     integer :: status
 
-    call begin_file(self, path, shared, access)
+    call begin_file(self, path, shared .and. nproc() > 1, access)
     self%writing = writing
     self%complete = .true.
-    if (is_pipe(path)) then
-      self%info = 1
-      self%message = path//': cannot open the file: it is a pipe'
-    end if
+    if (self%info /= 0) return
+    if (is_pipe(path)) call self%fail('cannot open the file: it is a pipe')
     if (self%info /= 0) return
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)
     call self%check(status, 'open the file')
     call h5pclose_f(access, status)
     if (writing) call hold_file(self)
-    call self%agree()
   end subroutine file_open
-
-  !> Hold the file by the number under which HDF5 has it. MPI tells none: then each process opens
-  !! the path once more.
-  subroutine hold_file(self)
-    class(h5_handle_t), intent(inout) :: self
-    type(c_ptr) :: handle
-    integer(c_int), pointer :: number
-
-    if (self%info /= 0) return
-    if (self%shared) then
-      call self%held%hold(self%path, self%message)
-    else
-      call self%check(h5fget_vfd_handle(self%id, H5P_DEFAULT_F, handle), 'open the file')
-      if (self%info /= 0) return
-      call c_f_pointer(handle, number)
-      call self%held%hold(self%path, self%message, number)
-    end if
-    self%broken = len(self%message) > 0
-    if (self%broken) self%info = 1
-  end subroutine hold_file
 
   !> Start HDF5 and make the lists that say how the file is accessed.
   subroutine begin_file(self, path, shared, access)
@@ -195,103 +162,83 @@ contains
     character(*), intent(in) :: path
     logical, intent(in) :: shared
     integer(hid_t), intent(out) :: access
-    integer :: status
+    integer :: status(6)
 
     self%path = path
-    self%shared = shared .and. nproc() > 1
+    self%shared = shared
     self%info = 0
-    self%complete = .false.
+    self%message = ''
     self%broken = .false.
+    self%complete = .false.
     self%id = -1
     access = -1
-    call hdf5_start(status)
-    call self%check(status, 'start HDF5')
+    status = 0
+    call hdf5_start(status(1))
+    call self%check(status(1), 'start HDF5')
     if (self%info /= 0) return
-    call h5pcreate_f(H5P_FILE_ACCESS_F, access, status)
-    call self%check(status, 'set the access')
-    call h5pset_fclose_degree_f(access, H5F_CLOSE_STRONG_F, status)
-    call self%check(status, 'set the access')
-    call h5pset_cache_f(access, 0, 1_size_t, 0_size_t, 0.0, status)   ! rows go straight to the file
-    call self%check(status, 'set the access')
-    call h5pcreate_f(H5P_DATASET_XFER_F, self%collective, status)
-    call self%check(status, 'set the access')
-    if (.not. self%shared) return
-    call set_file_access(access, status)
-    call self%check(status, 'set the access')
-    call set_collective(self%collective, status)
-    call self%check(status, 'set the access')
+    call h5pcreate_f(H5P_FILE_ACCESS_F, access, status(1))
+    call h5pset_fclose_degree_f(access, H5F_CLOSE_STRONG_F, status(2))
+    call h5pset_cache_f(access, 0, 1_size_t, 0_size_t, 0.0, status(3))   ! rows go to the file
+    call h5pcreate_f(H5P_DATASET_XFER_F, self%transfer, status(4))
+    if (shared) call set_file_access(access, status(5))
+    if (shared) call set_collective(self%transfer, status(6))
+    call self%check(minval(status), 'set the access')
   end subroutine begin_file
 
-  !> Write everything out and close the file, its datasets with it; done even after an error.
+  !> Hold the file by the number under which HDF5 has it. MPI tells none: then the root process
+  !! opens the path once more.
+  subroutine hold_file(self)
+    class(h5_handle_t), intent(inout) :: self
+    character(:), allocatable :: message
+    type(c_ptr) :: handle
+    integer(c_int), pointer :: number
+
+    if (self%info /= 0 .or. (self%shared .and. .not. is_root())) return
+    if (self%shared) then
+      call self%held%hold(self%path, message)
+    else
+      call self%check(h5fget_vfd_handle(self%id, H5P_DEFAULT_F, handle), 'open the file')
+      if (self%info /= 0) return
+      call c_f_pointer(handle, number)
+      call self%held%hold(self%path, message, number)
+    end if
+    if (len(message) > 0) call self%fail(message)
+  end subroutine hold_file
+
+  !> Write everything out and close the file, its datasets with it; done even after an error. Once
+  !! HDF5 has failed the file is left as it is on the disk, for to close it would write half of what
+  !! is in memory; one that was created and never complete there is deleted.
   subroutine file_close(self, stored)
     class(h5_handle_t), intent(inout) :: self
     logical, intent(in), optional :: stored   !! wait until the disk has it
-    integer(i8) :: used
+    character(:), allocatable :: message
+    integer(hsize_t) :: used
+    real(wp) :: here(1)
     integer :: status
 
     if (self%id < 0) return
     if (self%writing) call self%flush()
     if (self%writing .and. (self%broken .or. .not. self%complete)) then
-      call leave(self)
-    else
-      used = length_of(self)
-      call h5pclose_f(self%collective, status)
-      call h5fclose_f(self%id, status)
-      call self%check(status, 'close the file')
-      if (self%writing .and. .not. self%shared) call self%held%shorten(used)
-      if (present(stored) .and. self%info == 0) call store_file(self)
+      if (.not. self%complete) call self%held%discard()
+      call self%held%let_go()
+      self%id = -1
+      return
     end if
+    if (.not. self%shared) call h5fget_filesize_f(self%id, used, status)
+    call h5pclose_f(self%transfer, status)
+    call h5fclose_f(self%id, status)
     self%id = -1
-    call self%agree()
+    call self%check(status, 'close the file')
+    here = 0.0_wp
+    if (self%shared) call global_max(here)   ! what the others write is in the file only then
+    if (self%writing .and. .not. self%shared) call self%held%shorten(int(used, i8))
+    if (present(stored) .and. self%info == 0 .and. (is_root() .or. .not. self%shared)) then
+      call self%held%store(message)
+      if (len(message) > 0) call self%held%discard()
+      if (len(message) > 0) call self%fail(message)
+    end if
     call self%held%let_go()
   end subroutine file_close
-
-  !> Wait until a file that was closed is on the disk; one that does not get there is deleted.
-  subroutine store_file(self)
-    class(h5_handle_t), intent(inout) :: self
-
-    call self%held%store(self%message)
-    self%broken = len(self%message) > 0
-    if (.not. self%broken) return
-    self%info = 1
-    call self%held%discard()
-  end subroutine store_file
-
-  !> Close a file that was created, and delete it.
-  subroutine abandon(self)
-    class(h5_handle_t), intent(inout) :: self
-
-    self%complete = .false.
-    self%broken = .true.
-    if (self%info == 0) self%info = 1
-    if (self%id >= 0) call leave(self)
-    self%id = -1
-  end subroutine abandon
-
-  !> Bytes of a file that are in use. Of a shared file HDF5 does not know; it cuts it to that length
-  !! when it flushes.
-  function length_of(self) result(bytes)
-    class(h5_handle_t), intent(inout) :: self
-    integer(i8) :: bytes
-    integer(hsize_t) :: used
-    integer :: status
-
-    if (self%shared) then
-      bytes = self%held%length()
-    else
-      call h5fget_filesize_f(self%id, used, status)
-      call self%check(status, 'tell the size of the file')
-      bytes = int(used, i8)
-    end if
-  end function length_of
-
-  !> Leave a file that could not be written: to close it would write half of what is in memory.
-  !! One that was never complete is deleted.
-  subroutine leave(self)
-    class(h5_handle_t), intent(inout) :: self
-
-    if (.not. self%complete) call self%held%discard()
-  end subroutine leave
 
   !> Hand everything written so far to the operating system.
   subroutine file_flush(self)
@@ -301,42 +248,47 @@ contains
     if (self%info /= 0) return
     call h5fflush_f(self%id, H5F_SCOPE_LOCAL_F, status)
     call self%check(status, 'write')
-    call self%agree()
     if (self%info == 0) self%complete = .true.
   end subroutine file_flush
 
   !> See to it that the next changes of a file that was just flushed find this much room at its end.
-  !! Without room nothing more is written to it but by `last_integer`.
+  !! Without room nothing more is written to it but by `last_integer`. Of a shared file HDF5 does
+  !! not know the length in use; it cuts it to that when it flushes.
   subroutine reserve(self, bytes)
     class(h5_handle_t), intent(inout) :: self
     integer(i8), intent(in) :: bytes
     character(:), allocatable :: reason
-
-    if (self%info /= 0) return
-    reason = ''
-    if (is_root() .or. .not. self%shared) call self%held%lengthen(length_of(self) + bytes, reason)
-    if (self%shared) call broadcast(reason)
-    if (len(reason) == 0) return
-    self%info = 1
-    self%message = reason
-  end subroutine reserve
-
-  !> Create a group; the group around it must exist.
-  subroutine file_group(self, name)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: name   !! full path in the file
-    integer(hid_t) :: group
+    integer(hsize_t) :: used
     integer :: status
 
     if (self%info /= 0) return
-    call h5gcreate_f(self%id, name, group, status)
+    reason = ''
+    if (is_root() .or. .not. self%shared) then
+      used = int(self%held%length(), hsize_t)
+      if (.not. self%shared) call h5fget_filesize_f(self%id, used, status)
+      call self%held%lengthen(int(used, i8) + bytes, reason)
+    end if
+    if (self%shared) call broadcast(reason)
+    if (len(reason) == 0) return
+    self%info = 1
+    self%message = self%path//': '//reason
+  end subroutine reserve
+
+  !> Create a group; the group around it must exist.
+  subroutine group(self, name)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: name   !! full path in the file
+    integer(hid_t) :: id
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5gcreate_f(self%id, name, id, status)
     call self%check(status, 'create '//name)
-    if (self%info == 0) call h5gclose_f(group, status)
-    call self%agree()
-  end subroutine file_group
+    if (self%info == 0) call h5gclose_f(id, status)
+  end subroutine group
 
   !> Is there an object of this name? The group around it must exist.
-  function file_has(self, name) result(yes)
+  function has(self, name) result(yes)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: name
     logical :: yes
@@ -346,10 +298,10 @@ contains
     if (self%info /= 0) return
     call h5lexists_f(self%id, name, yes, status)
     call self%check(status, 'look for '//name)
-  end function file_has
+  end function has
 
   !> Remove a dataset, or a group with all it holds.
-  subroutine file_remove(self, name)
+  subroutine remove(self, name)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: name
     integer :: status
@@ -357,6 +309,183 @@ contains
     if (self%info /= 0) return
     call h5ldelete_f(self%id, name, status)
     call self%check(status, 'remove '//name)
-  end subroutine file_remove
+  end subroutine remove
+
+  !> A text of any length as an attribute; h5py shows it as str. Any attribute that exists is
+  !! replaced.
+  subroutine attribute_text(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name, value
+    character(kind=c_char), target :: letters(len(value) + 1)
+    type(c_ptr), target :: start(1)
+    integer(hid_t) :: text_type
+    integer :: status
+
+    if (self%info /= 0) return
+    letters = transfer(value//c_null_char, letters)
+    start(1) = c_loc(letters)
+    call h5tcopy_f(H5T_STRING, text_type, status)
+    call h5tset_cset_f(text_type, H5T_CSET_UTF8_F, status)
+    call put_attribute(self, object, name, text_type, single_value, c_loc(start))
+    call h5tclose_f(text_type, status)
+  end subroutine attribute_text
+
+  !> A text as an attribute of fixed length in ASCII, the form that VTK asks for.
+  subroutine fixed_text_attribute(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    character(*), intent(in), target :: value
+    integer(hid_t) :: text_type
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5tcopy_f(H5T_FORTRAN_S1, text_type, status)
+    call h5tset_size_f(text_type, int(len(value), size_t), status)
+    call put_attribute(self, object, name, text_type, single_value, c_loc(value))
+    call h5tclose_f(text_type, status)
+  end subroutine fixed_text_attribute
+
+  subroutine attribute_integer(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer, intent(in) :: value
+    integer(i8), target :: wide
+
+    wide = int(value, i8)
+    call put_attribute(self, object, name, h5kind_to_type(i8, H5_INTEGER_KIND), single_value, &
+                       c_loc(wide))
+  end subroutine attribute_integer
+
+  subroutine attribute_integers(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer, intent(in) :: value(:)
+    integer(i8), target :: wide(size(value))
+
+    wide = int(value, i8)
+    call put_attribute(self, object, name, h5kind_to_type(i8, H5_INTEGER_KIND), &
+                       shape(value, kind=hsize_t), c_loc(wide))
+  end subroutine attribute_integers
+
+  subroutine attribute_real(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    real(wp), intent(in), target :: value
+
+    call put_attribute(self, object, name, H5T_NATIVE_DOUBLE, single_value, c_loc(value))
+  end subroutine attribute_real
+
+  !> Reals of any shape; h5py shows its reverse.
+  subroutine attribute_reals(self, object, name, value, extent)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    real(wp), intent(in), target, contiguous :: value(:)
+    integer, intent(in), optional :: extent(:)   !! else they are a row
+
+    if (present(extent)) then
+      call put_attribute(self, object, name, H5T_NATIVE_DOUBLE, int(extent, hsize_t), c_loc(value))
+    else
+      call put_attribute(self, object, name, H5T_NATIVE_DOUBLE, shape(value, kind=hsize_t), &
+                         c_loc(value))
+    end if
+  end subroutine attribute_reals
+
+  !> Create the attribute, or overwrite the one that is there, which must have the same type and
+  !! shape.
+  subroutine put_attribute(self, object, name, type, extent, data)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer(hid_t), intent(in) :: type
+    integer(hsize_t), intent(in) :: extent(:)
+    type(c_ptr), intent(in) :: data
+    character(:), allocatable :: what
+    integer(hid_t) :: owner, space, id
+    integer :: status
+    logical :: exists
+
+    if (self%info /= 0) return
+    what = 'write '//object//'@'//name
+    call h5oopen_f(self%id, object, owner, status)
+    call self%check(status, what)
+    if (self%info /= 0) return
+    call h5aexists_f(owner, name, exists, status)
+    call self%check(status, what)
+    if (exists) then
+      call h5aopen_f(owner, name, id, status)
+    else
+      if (size(extent) == 0) call h5screate_f(H5S_SCALAR_F, space, status)
+      if (size(extent) > 0) call h5screate_simple_f(size(extent), extent, space, status)
+      call h5acreate_f(owner, name, type, space, id, status)
+    end if
+    call self%check(status, what)
+    if (.not. exists) call h5sclose_f(space, status)
+    if (self%info /= 0) return
+    call h5awrite_f(id, type, data, status)
+    call self%check(status, what)
+    call h5aclose_f(id, status)
+    call h5oclose_f(owner, status)
+  end subroutine put_attribute
+
+  !> Overwrite an attribute that is there, also when there is no room for anything else.
+  subroutine last_integer(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer, intent(in) :: value
+    integer :: before
+
+    if (self%broken .or. self%id < 0) return
+    before = self%info
+    self%info = 0
+    call self%attribute(object, name, value)
+    call self%flush()
+    if (before /= 0) self%info = before
+  end subroutine last_integer
+
+  !> A text attribute that `attribute` wrote.
+  subroutine read_text_attribute(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    character(:), allocatable, intent(out) :: value
+    type(c_ptr), target :: start(1)
+    type(c_ptr) :: data
+    integer(hid_t) :: id, text_type
+    integer :: status
+
+    value = ''
+    if (self%info /= 0) return
+    call h5aopen_by_name_f(self%id, object, name, id, status)
+    call self%check(status, 'read '//object//'@'//name)
+    if (self%info /= 0) return
+    call h5aget_type_f(id, text_type, status)
+    data = c_loc(start)
+    call h5aread_f(id, text_type, data, status)
+    call self%check(status, 'read '//object//'@'//name)
+    if (self%info == 0) value = text_at(start(1))
+    call h5tclose_f(text_type, status)
+    call h5aclose_f(id, status)
+  end subroutine read_text_attribute
+
+  subroutine read_integer_attribute(self, object, name, value)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer, intent(out) :: value
+    integer(i8), target :: wide
+    type(c_ptr) :: data
+    integer(hid_t) :: id
+    integer :: status
+
+    wide = 0
+    if (self%info == 0) then
+      call h5aopen_by_name_f(self%id, object, name, id, status)
+      call self%check(status, 'read '//object//'@'//name)
+    end if
+    if (self%info == 0) then
+      data = c_loc(wide)
+      call h5aread_f(id, h5kind_to_type(i8, H5_INTEGER_KIND), data, status)
+      call self%check(status, 'read '//object//'@'//name)
+      call h5aclose_f(id, status)
+    end if
+    value = int(wide)
+  end subroutine read_integer_attribute
 
 end module hdf5_handle_m

@@ -28,10 +28,9 @@ module output_m
   private
   public :: output_t, check_output, open_output, write_due_output, close_output
 
-  character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', &
-    block_name = '/blocks.vtkhdf'
+  character(*), parameter :: run_name = 'run.h5', field_name = 'fields.vtkhdf', &
+    block_name = 'blocks.vtkhdf'
   character(*), parameter :: restart_name(2) = ['restart-a.h5', 'restart-b.h5']
-  character(*), parameter :: unfinished = '.part'   !! of a restart file
   real(wp), parameter :: look_interval = 0.5_wp     !! wall time between two looks at the folder [s]
 
   type :: output_t
@@ -130,21 +129,37 @@ contains
     type(bed_t), intent(in) :: bed
     type(output_t), intent(inout) :: output
 
-    call create_run_file(output%folder//run_name, output%text, output%parameters, state, &
+    call create_run_file(output%folder//'/'//run_name, output%text, output%parameters, state, &
       bed, make_row(output%properties, 0.0_wp, state, step_report_t()), &
       output%run_file)
     if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', 'note', &
       not_resolved)
-    if (output%fields) call create_field_file(output%folder//field_name, state, output%field_file)
-    if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &
+    if (output%fields) call create_field_file(output%folder//'/'//field_name, state, &
+      output%field_file)
+    if (output%surfaces) call create_block_file(output%folder//'/'//block_name, state%blocks, &
       output%block_file)
     call check_files(output)
     call watch_folder(output)
     if (output%code == exit_ok) return
-    call output%run_file%file%abandon()   ! no files that would look like results
-    call output%field_file%file%abandon()
-    call output%block_file%file%abandon()
+    call close_files(output)
+    call discard(output, run_name)   ! no files that would look like results
+    call discard(output, field_name)
+    call discard(output, block_name)
   end subroutine create_files
+
+  !> Delete a file that could not be written, if the folder is still that of this run.
+  subroutine discard(output, name)
+    type(output_t), intent(inout) :: output
+    character(*), intent(in) :: name
+    character(:), allocatable :: message
+    integer :: code
+
+    if (.not. is_root()) return
+    code = exit_ok
+    message = ''
+    call output%lock%verify(code, message)
+    if (code == exit_ok) call output%lock%remove(name)
+  end subroutine discard
 
   !> Close all files, unless another run has taken the folder and them. All processes call.
   subroutine close_files(output, exit_code)
@@ -171,11 +186,12 @@ contains
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//run_name, state%clock, state%blocks, &
+    call reopen_run_file(output%folder//'/'//run_name, state%clock, state%blocks, &
       make_row(output%properties, 0.0_wp, state, step_report_t()), output%run_file)
     if (state%clock%n_frames > 0) then
-      if (output%fluid) call reopen_field_file(output%folder//field_name, state, output%field_file)
-      if (state%blocks%n > 0) call reopen_block_file(output%folder//block_name, state%blocks, &
+      if (output%fluid) call reopen_field_file(output%folder//'/'//field_name, state, &
+        output%field_file)
+      if (state%blocks%n > 0) call reopen_block_file(output%folder//'/'//block_name, state%blocks, &
                                                      state%clock, output%block_file)
     end if
     call check_files(output)
@@ -204,8 +220,8 @@ contains
       call continue_field_file(output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
-      if (is_root()) call output%lock%remove(field_name(2:))   ! of a part of the run that was killed
-      call create_field_file(output%folder//field_name, state, output%field_file)
+      if (is_root()) call output%lock%remove(field_name)   ! a killed run may have left it
+      call create_field_file(output%folder//'/'//field_name, state, output%field_file)
     end if
   end subroutine continue_fields
 
@@ -218,8 +234,8 @@ contains
       call continue_block_file(output%block_file)
       if (.not. output%surfaces) call output%block_file%file%close()
     else if (output%surfaces) then
-      if (is_root()) call output%lock%remove(block_name(2:))
-      call create_block_file(output%folder//block_name, state%blocks, output%block_file)
+      if (is_root()) call output%lock%remove(block_name)
+      call create_block_file(output%folder//'/'//block_name, state%blocks, output%block_file)
     end if
   end subroutine continue_surfaces
 
@@ -332,17 +348,18 @@ contains
   subroutine save_state(state, output)
     type(run_state_t), intent(inout) :: state
     type(output_t), intent(inout) :: output
-    character(:), allocatable :: message
+    character(:), allocatable :: message, part
     integer :: info
 
     call watch_folder(output)
     if (output%code /= exit_ok) return
     call tic(output%restart_phase)
     associate (name => restart_name(output%next_restart), lock => output%lock)
-      if (is_root()) call lock%remove(name//unfinished)   ! of a run that was killed
-      call write_restart(output%folder//'/'//name//unfinished, output%text, output%parameters, &
-        state, info, message)
-      if (is_root() .and. info == 0) call lock%rename(name//unfinished, name, info, message)
+      part = name//'.part'
+      if (is_root()) call lock%remove(part)   ! of a run that was killed
+      call write_restart(output%folder//'/'//part, output%text, output%parameters, state, info, &
+        message)
+      if (is_root() .and. info == 0) call lock%rename(part, name, info, message)
       call broadcast(info)
       if (info == 0) output%restart_file = output%folder//'/'//name
     end associate
@@ -352,6 +369,7 @@ contains
     if (info == 0) return
     output%code = exit_files
     output%message = message
+    call discard(output, part)   ! the older files may need its room
   end subroutine save_state
 
   !> Write what a run must end with, its last row, frames and state, say how it ended, and close all

@@ -20,7 +20,7 @@
 !! `list_state` names all of it. The volume flux through a face is aperture*area*uf + solid_flux.
 module restart_m
   use kinds_m, only: wp
-  use parallel_m, only: nproc, broadcast, halo_exchange
+  use parallel_m, only: nproc, broadcast, global_max, halo_exchange
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -141,8 +141,9 @@ contains
 
     written = ''
     n = 0
-    call file%open(path, .true., .false.)
+    call file%open(path, .false., .false.)
     call check_kind(file, parameters, info, message)
+    call agree(path, info, message)
     if (info == 0) then
       call file%read('/contacts/n', n(1:1))
       call file%read('/contacts/rest_n', n(2:2))
@@ -158,14 +159,26 @@ contains
     call file%close()
     if (info /= 0) return
     info = file%info
-    if (info /= 0) then
-      message = file%message
-      return
-    end if
+    if (info /= 0) message = file%message
+    call agree(path, info, message)
+    if (info /= 0) return
     if (list%checksum() == written) return
     info = 1
     message = path//': damaged, its content does not have its checksum'
   end subroutine read_state
+
+  !> An error of any process is one of all.
+  subroutine agree(path, info, message)
+    character(*), intent(in) :: path
+    integer, intent(inout) :: info
+    character(:), allocatable, intent(inout) :: message
+    real(wp) :: worst(1)
+
+    worst = real(info, wp)
+    call global_max(worst)
+    if (info == 0 .and. worst(1) > 0.0_wp) message = path//': another process cannot read it'
+    info = nint(worst(1))
+  end subroutine agree
 
   !> Is this a restart file of this case?
   subroutine check_kind(file, parameters, info, message)
@@ -271,9 +284,9 @@ contains
           [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
       end do
     case (item_reals)
-      call file%store_shaped_reals(item%name, item%units, item%extent, item%reals)
+      call file%store(item%name, item%units, item%reals, item%extent)
     case default
-      call file%store_shaped_integers(item%name, '1', item%extent, item%numbers())
+      call file%store(item%name, '1', item%numbers(), item%extent)
     end select
   end subroutine write_item
 
@@ -286,8 +299,10 @@ contains
     real(wp), allocatable :: row(:)
     integer, allocatable :: numbers(:)
     integer :: first(3), last(3), d
+    logical :: well
 
-    if (file%info /= 0) return
+    well = file%info == 0
+    if (.not. well .and. item%kind /= item_cells) return   ! other processes wait for the halos
     select case (item%kind)
     case (item_cells)
       do d = 1, item%extent(4)
@@ -307,7 +322,8 @@ contains
       if (item%kind == item_integers) item%integers = numbers
       if (item%kind == item_logicals) item%logicals = numbers == 1
     end select
-    if (file%info /= 0 .and. len(item%units) > 0) file%message = file%message//' ['//item%units//']'
+    if (well .and. file%info /= 0 .and. len(item%units) > 0) file%message = file%message//' [' &
+      //item%units//']'
   end subroutine read_item
 
 end module restart_m

@@ -15,7 +15,7 @@ module write_run_m
   use clock_m, only: clock_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use hdf5_table_m, only: h5_table_t, creating, reopening, appending
+  use table_m, only: table_t, creating, reopening, appending
   use file_space_m, only: bytes_for_change
   use diagnostics_m, only: quantity_t
   implicit none
@@ -28,7 +28,7 @@ module write_run_m
   character(*), parameter :: once_units(*) = ['s', 's', 's', 'm']
   integer, parameter :: running = -1         !! exit status until the run ends, or if it was killed
 
-  type, extends(h5_table_t) :: run_file_t
+  type, extends(table_t) :: run_file_t
     real(wp) :: wall_time = 0.0_wp                     !! of the last row when a run goes on [s]
     real(wp), allocatable, private :: q(:, :)          !! as in the last row
     real(wp), allocatable, private :: once(:, :)       !! (blocks, `once_name`) as in the file
@@ -68,7 +68,7 @@ contains
     end associate
   end subroutine create_run_file
 
-  !> The columns, see `hdf5_table_m`.
+  !> The columns, see `table_m`.
   subroutine list_columns(row, blocks, self)
     type(quantity_t), intent(in) :: row(:)       !! the time first
     type(blocks_t), intent(in) :: blocks
@@ -152,8 +152,8 @@ contains
     type(h5_file_t), intent(inout) :: file
 
     call file%group('/bed')
-    call file%store('/bed/points', 'm', bed%point)
-    call file%store('/bed/triangles', '1', bed%triangle - 1)
+    call file%store('/bed/points', 'm', [bed%point], shape(bed%point))
+    call file%store('/bed/triangles', '1', [bed%triangle - 1], shape(bed%triangle))
   end subroutine write_bed
 
   !> The shapes; corners are counted from 0, as h5py and VTK do.
@@ -164,16 +164,17 @@ contains
 
     call file%group('/shapes')
     do s = 1, size(blocks%shapes)
-      associate (shape => blocks%shapes(s), here => '/shapes/'//trim(blocks%shapes(s)%name))
+      associate (form => blocks%shapes(s), here => '/shapes/'//trim(blocks%shapes(s)%name))
         call file%group(here)
-        call file%store(here//'/points', 'm', shape%point)
-        call file%store(here//'/triangles', '1', shape%triangle - 1)
-        call file%store(here//'/tets', '1', shape%tet - 1)
-        call file%store(here//'/sphere_centre', 'm', shape%sphere_centre)
-        call file%store(here//'/sphere_radius', 'm', shape%sphere_radius)
-        call file%attribute(here, 'volume', shape%volume)
-        call file%attribute(here, 'inertia', shape%inertia)
-        call file%attribute(here, 'density', shape%density)
+        call file%store(here//'/points', 'm', [form%point], shape(form%point))
+        call file%store(here//'/triangles', '1', [form%triangle - 1], shape(form%triangle))
+        call file%store(here//'/tets', '1', [form%tet - 1], shape(form%tet))
+        call file%store(here//'/sphere_centre', 'm', [form%sphere_centre], &
+          shape(form%sphere_centre))
+        call file%store(here//'/sphere_radius', 'm', form%sphere_radius)
+        call file%attribute(here, 'volume', form%volume)
+        call file%attribute(here, 'inertia', [form%inertia], [3, 3])
+        call file%attribute(here, 'density', form%density)
       end associate
     end do
   end subroutine write_shapes
@@ -196,7 +197,7 @@ contains
     do c = 1, size(once_name)
       call file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), once_values(blocks, c))
     end do
-    call file%store('/bodies/planned', 'm', blocks%planned)
+    call file%store('/bodies/planned', 'm', [blocks%planned], shape(blocks%planned))
     call file%store('/bodies/status', '1', blocks%status)
     call file%attribute('/bodies/status', 'meaning', '0 not there yet, 1 being lowered, ' &
       //'2 released, 3 left out, 4 out of the tank')
@@ -227,11 +228,11 @@ contains
       values = once_values(blocks, c)
       if (.not. any(abs(values - self%once(:, c)) > 0.0_wp)) cycle
       self%once(:, c) = values
-      call self%file%rewrite('/bodies/'//trim(once_name(c)), values)
+      call self%file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), values)
     end do
     if (all(blocks%status == self%status)) return
     self%status = blocks%status
-    call self%file%rewrite('/bodies/status', self%status)
+    call self%file%store('/bodies/status', '1', self%status)
   end subroutine rewrite_once
 
   !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
@@ -252,8 +253,8 @@ contains
     call self%find_rows(clock%n_rows, clock%t)
     wall_time = 0.0_wp
     q = 0.0_wp
-    call self%read_row_of('/bodies/quaternion', clock%n_rows, q)   ! the next is like the last due
-    call self%read_row_of('/series/wall_time', self%rows, wall_time)
+    call self%read_row('/bodies/quaternion', clock%n_rows, q)   ! the next is like the last due
+    call self%read_row('/series/wall_time', self%rows, wall_time)
     self%q = reshape(q, [4, blocks%n])
     self%wall_time = wall_time(1)
     self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
@@ -272,9 +273,9 @@ contains
       call file%reserve(bytes_for_change + 2*(len(text) + len(parameters)))
       call self%keep(self%rows)
       do c = 1, size(once_name)
-        call file%rewrite('/bodies/'//trim(once_name(c)), self%once(:, c))
+        call file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), self%once(:, c))
       end do
-      call file%rewrite('/bodies/status', self%status)
+      call file%store('/bodies/status', '1', self%status)
       call file%attribute('/provenance', 'namelist', text)
       call file%attribute('/provenance', 'parameters', parameters)
       call file%attribute('/provenance', 'finished', '')
@@ -295,7 +296,7 @@ contains
       call self%keep(rows_before)
       call self%file%flush()
     end if
-    call self%file%reserve(self%bytes_for_table())
+    call self%file%reserve(self%bytes_for_row())
     call follow_sign(blocks%q, self%q)
     call self%begin(appending)
     call list_columns(row, blocks, self)

@@ -14,8 +14,9 @@ module write_vtkhdf_m
   use rigid_body_m, only: blocks_t
   use clock_m, only: clock_t
   use run_state_m, only: run_state_t
-  use hdf5_file_m, only: h5_file_t, file_real32, file_real64
-  use hdf5_table_m, only: h5_table_t, creating, reopening, appending
+  use hdf5_file_m, only: h5_file_t
+  use file_space_m, only: bytes_for_change
+  use table_m, only: table_t, creating, reopening, appending
   implicit none
   private
   public :: field_file_t, create_field_file, reopen_field_file, continue_field_file, &
@@ -27,11 +28,11 @@ module write_vtkhdf_m
     cell_data = '/VTKHDF/CellData/'
   integer, parameter :: frame_chunk = 512   !! of a number per frame [bytes]
 
-  type, extends(h5_table_t) :: field_file_t
+  type, extends(table_t) :: field_file_t
     real(sp), allocatable, private :: values(:)   !! of the own cells, three for a vector
   end type field_file_t
 
-  type, extends(h5_table_t) :: block_file_t
+  type, extends(table_t) :: block_file_t
     integer, private :: n_points = 0, n_cells = 0
   end type block_file_t
 
@@ -45,6 +46,7 @@ contains
 
     associate (file => self%file, grid => state%grid)
       call file%create(path, .true.)
+      call file%reserve(16*bytes_for_change)
       call start_file(file, 'ImageData')
       call file%attribute(root, 'WholeExtent', [0, grid%n(1), 0, grid%n(2), 0, grid%n(3)])
       call file%attribute(root, 'Origin', grid%origin)
@@ -61,7 +63,7 @@ contains
     end associate
   end subroutine create_field_file
 
-  !> The columns of the fluid, see `hdf5_table_m`.
+  !> The columns of the fluid, see `table_m`.
   subroutine list_fields(state, self)
     type(run_state_t), intent(in) :: state
     type(field_file_t), intent(inout) :: self
@@ -130,7 +132,7 @@ contains
   !> Keep the first frames.
   subroutine drop_frames(frames, self)
     integer, intent(in) :: frames
-    class(h5_table_t), intent(inout) :: self
+    class(table_t), intent(inout) :: self
 
     call count_frames(self%file, frames)
     call self%keep(frames)
@@ -155,7 +157,7 @@ contains
     type(run_state_t), intent(in) :: state
 
     if (self%rows /= frames_before) call drop_frames(frames_before, self)
-    call self%file%reserve(self%bytes_for_table())
+    call self%file%reserve(self%bytes_for_row())
     call self%begin(appending)
     call list_fields(state, self)
     self%rows = self%rows + 1
@@ -249,7 +251,7 @@ contains
     end associate
   end subroutine create_block_file
 
-  !> The columns of the surfaces, see `hdf5_table_m`.
+  !> The columns of the surfaces, see `table_m`.
   subroutine list_surfaces(t, blocks, self)
     real(wp), intent(in) :: t   !! [s]
     type(blocks_t), intent(in) :: blocks
@@ -259,8 +261,8 @@ contains
     allocate (x(3, self%n_points), v(3, self%n_points))
     call move_points(blocks, x, v)
     call self%column(steps//'/Values', 's', t)
-    call self%points(root//'/Points', 'm', file_real64, x)
-    call self%points(root//'/PointData/velocity', 'm/s', file_real32, v)
+    call self%points(root//'/Points', 'm', .false., x)
+    call self%points(root//'/PointData/velocity', 'm/s', .true., v)
     call self%cells(cell_data//'released', '1', on_cells(blocks, merge(1, 0, blocks%present)))
     associate (frame => int(self%rows, i8), none => [0_i8, 0_i8, 0_i8, 0_i8])
       call self%column(steps//'/PartOffsets', '1', 0_i8)
@@ -408,7 +410,7 @@ contains
 
     if (.not. is_root()) return
     if (self%rows /= frames_before) call drop_frames(frames_before, self)
-    call self%file%reserve(self%bytes_for_table())
+    call self%file%reserve(self%bytes_for_row())
     call self%begin(appending)
     call list_surfaces(t, blocks, self)
     self%rows = self%rows + 1

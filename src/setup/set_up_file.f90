@@ -98,8 +98,8 @@ contains
     associate (file => run%file)
       call file%group('/plan')
       call file%store('/plan/line', '1', line)
-      call file%store('/plan/place', 'm', place)
-      call file%store('/plan/spread', 'm', spread)
+      call file%store('/plan/place', 'm', [place], shape(place))
+      call file%store('/plan/spread', 'm', [spread], shape(spread))
     end associate
   end subroutine write_places
 

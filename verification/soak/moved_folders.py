@@ -93,7 +93,7 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
         shutil.rmtree(path)
     shutil.rmtree(kept, ignore_errors=True)
     first = shop.start("--output", folder)
-    wanted = folder / ("restart-a.h5" if way == "unseen in place" else "run.lock")
+    wanted = folder / ("restart-a.h5" if way == "unseen in place" else "run.h5")
     while not wanted.exists() and first.poll() is None:
         time.sleep(0.001)
     time.sleep(seconds)

@@ -5,9 +5,9 @@ module test_hdf5_file_m
   use, intrinsic :: iso_c_binding, only: c_funptr, c_int, c_long, c_null_char
   use c_library_m, only: c_getrlimit, c_rename, c_signal
   use kinds_m, only: wp, sp, i8
-  use parallel_m, only: is_root, nproc, my_rank, broadcast
-  use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_real32, file_integer32
-  use file_space_m, only: bytes_for_change
+  use parallel_m, only: is_root, nproc, my_rank, global_max
+  use hdf5_file_m, only: h5_file_t
+  use table_m, only: table_t, creating, reopening, appending
   use check_m, only: check
   implicit none
   private
@@ -60,10 +60,10 @@ contains
 
   !> Wait until all processes are here.
   subroutine meet()
-    integer :: n
+    real(wp) :: here(1)
 
-    n = 0
-    call broadcast(n)
+    here = 0.0_wp
+    call global_max(here)
   end subroutine meet
 
   subroutine test_attributes()
@@ -105,11 +105,11 @@ contains
     a = reshape([(1.0_wp/i, i=1, 6)], [2, 3])
     call remove(path)
     call file%create(path, .false.)
-    call file%store('/a', 'm', a)
+    call file%store('/a', 'm', [a], shape(a))
     call file%store('/n', '1', [5, 6, 7, 8])
     call file%store('/nothing', 'm', [real(wp) ::])
     call file%store('/name', '1', ['hexapod', 'box    '])
-    call file%rewrite('/a', [(2.0_wp/i, i=1, 6)])
+    call file%store('/a', 'm', [(2.0_wp/i, i=1, 6)], [2, 3])
     call file%close()
     call check_file('datasets are written', file)
     call file%open(path, .false., .false.)
@@ -124,81 +124,99 @@ contains
     call file%close()
   end subroutine test_datasets
 
-  subroutine test_columns()
-    type(h5_file_t) :: file
-    type(h5_column_t) :: time, place, touched, field, nobody
+  !> The columns of a table that has all kinds of them.
+  subroutine list_columns(step, mode, table)
+    integer, intent(in) :: step, mode
+    type(table_t), intent(inout) :: table
+    real(wp) :: place(3, 2), nobody(3, 0)
     real(sp) :: cells(24)
-    real(wp) :: x(6)
-    integer :: step
+
+    place = step + reshape([0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], [3, 2])
+    cells = real(step, sp)
+    call table%begin(mode)
+    call table%column('/time', 's', real(step, wp))
+    call table%column('/place', 'm', place)
+    call table%column('/touched', '1', [step, -step])
+    call table%column('/nobody', 'm', nobody)
+    call table%points('/points', 'm', .true., place)
+    call table%cells('/cells', '1', [step, step + 1, step + 2])
+    call table%field('/field', 'Pa', [2, 3, 4], [1, 1, 1], [2, 3, 4], cells)
+  end subroutine list_columns
+
+  subroutine test_columns()
+    type(table_t) :: table
+    real(wp) :: x(6), points(3*2*11)
+    integer, allocatable :: found(:)
+    integer :: step, touched(22), cells(33)
 
     if (.not. is_root()) return
     call remove(path)
-    call file%create(path, .false.)
-    call file%new_column('/time', 's', file_real64, [integer ::], 4, time)
-    call file%new_column('/place', 'm', file_real64, [3, 2], 4, place)
-    call file%new_column('/touched', '1', file_integer32, [2], 4, touched)
-    call file%new_column('/nobody', 'm', file_real64, [3, 0], 4, nobody)
-    call file%new_compressed_column('/field', 'Pa', file_real32, [2, 3, 4], [2, 1], field)
+    call table%file%create(path, .false.)
+    table%chunk_bytes = 64
+    call list_columns(0, creating, table)
     do step = 1, 11
-      call file%append(time, [real(step, wp)])
-      call file%append(place, step + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp])
-      call file%append_integers(touched, [step, -step])
-      call file%append(nobody, [real(wp) ::])
-      cells = real(step, sp)
-      call file%append_block(field, [1, 1, 1], [2, 3, 4], cells)
-      call file%flush()
+      call list_columns(step, appending, table)
+      call table%file%flush()
     end do
-    call file%close()
-    call check_file('columns are written', file)
-
-    call file%open(path, .false., .true.)
-    call file%open_column('/place', file_real64, place)
-    call check('rows are counted', int(place%extent(place%rank)), 11)
-    call file%read_row(place, 7, x)
+    call table%file%close()
+    call check_file('columns are written', table%file)
+    call table%file%open(path, .false., .true.)
+    call list_columns(0, reopening, table)
+    call table%find_rows(10, 11.0_wp)
+    call check('rows are counted', table%rows == 11 .and. table%up_to_date)
+    call table%read_row('/place', 7, x)
     call check('a row comes back', x, 7 + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], 0.0_wp)
-    call file%resize(place, 6_i8)
-    call file%append(place, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp])
-    call file%resize(place, 9_i8)
-    call file%read_row(place, 7, x)
-    call check('rows are dropped and others appended', x(2), 2.0_wp, 0.0_wp)
-    call file%read_row(place, 8, x)
+    call table%file%read('/touched', touched)
+    call check('integers come back', all(touched(13:14) == [7, -7]))
+    call table%file%read('/cells', cells)
+    call check('several rows at once', all(cells(19:21) == [7, 8, 9]))
+    call table%file%read('/points', points)
+    call check('also in single precision', points(37:39), 7 + [0.1_wp, 0.2_wp, 0.3_wp], 1.0e-6_wp)
+    call table%keep(6)
+    call list_columns(20, appending, table)
+    call table%keep(9)
+    call table%read_row('/place', 7, x)
+    call check('rows are dropped and others appended', x(2), 20.2_wp, 0.0_wp)
+    call table%read_row('/place', 8, x)
     call check('a row dropped does not come back', all(ieee_is_nan(x)))
-    call file%open_column('/nobody', file_real64, nobody)
-    call check('a column without elements has rows too', int(nobody%extent(3)), 11)
-    call file%close()
-    call check_file('no error with columns', file)
+    call table%file%shape_of('/nobody', found)
+    call check('a column without elements has rows too', found(3), 9)
+    call table%find_rows(10, 1.0_wp)
+    call check('rows that are lost are noticed', index(table%file%message, 'has lost rows') > 0)
+    call table%file%close()
   end subroutine test_columns
 
   !> What was flushed can be read while the writer holds the file: no locks.
   subroutine test_read_while_open()
-    type(h5_file_t) :: writer, reader
-    type(h5_column_t) :: time, seen
+    type(table_t) :: writer
+    type(h5_file_t) :: reader
     real(wp) :: x(1)
 
     if (.not. is_root()) return
     call remove(path)
-    call writer%create(path, .false.)
-    call writer%new_column('/time', 's', file_real64, [integer ::], 64, time)
-    call writer%append(time, [42.0_wp])
-    call writer%flush()
+    call writer%file%create(path, .false.)
+    call writer%begin(creating)
+    call writer%column('/time', 's', 0.0_wp)
+    call writer%begin(appending)
+    call writer%column('/time', 's', 42.0_wp)
+    call writer%file%flush()
     call execute_command_line('cp '//path//' copy_' &
       //path)   ! what a reader, or a crash, finds on disk
     call reader%open('copy_'//path, .false., .false.)
-    call reader%open_column('/time', file_real64, seen)
-    call reader%read_row(seen, 1, x)
+    call reader%read('/time', x)
     call check('a flushed row is on disk', x(1), 42.0_wp, 0.0_wp)
     call reader%close()
-    call writer%close()
-    call check('no error while reading', reader%info + writer%info, 0)
+    call writer%file%close()
+    call check('no error while reading', reader%info + writer%file%info, 0)
     call remove('copy_'//path)
   end subroutine test_read_while_open
 
   !> All processes write their layers of one dataset; what is read does not depend on their number.
   subroutine test_shared_blocks()
-    type(h5_file_t) :: file
-    type(h5_column_t) :: field, count
+    type(table_t) :: table
     integer, parameter :: layers = 12
     real(wp) :: mine(2*layers), all_of_it(2*layers), x(2*layers)
+    real(sp) :: single(2*layers)
     integer :: first, last, i
 
     first = 1 + (layers*my_rank())/nproc()
@@ -206,46 +224,44 @@ contains
     mine = [(sqrt(real(i, wp)), i=1, 2*layers)]
     call remove(path)
     call meet()
-    call file%create(path, .true.)
-    call file%attribute('/', 'note', 'shared')
-    call file%new_blocks('/blocks', 'm', [2, layers])
-    call file%write_block('/blocks', [1, first], [2, last - first + 1], mine(2*first - 1:2*last))
-    call file%new_compressed_column('/field', 'm', file_real32, [2, layers], [5, 1], field)
-    call file%new_column('/count', '1', file_real64, [integer ::], 8, count)
-    do i = 1, 3
-      call file%append_block(field, [1, first], [2, last - first + 1], real(i*mine(2*first &
-        - 1:2*last), sp))
-      call file%append(count, [real(i, wp)])
-      call file%attribute('/', 'steps', i)
-      call file%flush()
+    call table%file%create(path, .true.)
+    call table%file%attribute('/', 'note', 'shared')
+    call table%file%store('/small', '1', [3, 4])
+    call table%file%new_blocks('/blocks', 'm', [2, layers])
+    call table%file%write_block('/blocks', [1, first], [2, last - first + 1], &
+      mine(2*first - 1:2*last))
+    do i = 0, 3
+      single = real(i*mine, sp)
+      call table%begin(merge(creating, appending, i == 0))
+      call table%column('/count', '1', real(i, wp))
+      call table%field('/field', 'm', [2, layers], [1, first], [2, last - first + 1], &
+        single(2*first - 1:2*last))
+      call table%file%attribute('/', 'steps', i)
+      call table%file%flush()
     end do
-    call file%close()
-    call check_file('a shared file is written', file)
+    call table%file%close()
+    call check_file('a shared file is written', table%file)
 
-    call file%open(path, .true., .false.)
+    call table%file%open(path, .false., .false.)
     all_of_it = 0.0_wp
-    call file%read_block('/blocks', [1, first], [2, last - first + 1], all_of_it(2*first &
-      - 1:2*last))
+    call table%file%read_block('/blocks', [1, first], [2, last - first + 1], &
+      all_of_it(2*first - 1:2*last))
     call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last), &
       0.0_wp)
-    call file%close()
-    if (.not. is_root()) return
-    call file%open(path, .false., .false.)
-    call file%read('/blocks', all_of_it)
+    call table%file%read('/blocks', all_of_it)
     call check('blocks of all processes fit together', all_of_it, mine, 0.0_wp)
-    call file%open_column('/field', file_real32, field)
-    call file%read_row(field, 3, x)
+    call table%file%read_block('/field', [1, 1, 3], [2, layers, 1], x)
     call check('compressed blocks fit together', x, real(real(3*mine, sp), wp), 0.0_wp)
-    call file%read('/count', x(:3))
+    call table%file%read('/count', x(:3))
     call check('rows of the root process arrive', x(:3), [1.0_wp, 2.0_wp, 3.0_wp], 0.0_wp)
-    call file%close()
-    call check_file('no error with a shared file', file)
+    call table%file%close()
+    call check_file('no error with a shared file', table%file)
+    call meet()
   end subroutine test_shared_blocks
 
   !> All processes together go on in a file that one process began.
   subroutine test_go_on_together()
-    type(h5_file_t) :: file
-    type(h5_column_t) :: field
+    type(table_t) :: table
     integer, parameter :: layers = 12
     real(sp) :: a(layers)
     real(wp) :: x(layers)
@@ -256,62 +272,61 @@ contains
     a = [(sqrt(real(i, sp)), i=1, layers)]
     if (is_root()) then
       call remove(path)
-    call file%create(path, .false.)
-      call file%new_compressed_column('/field', 'm', file_real32, [layers], [layers, 1], field)
-      do i = 1, 3
-        call file%append_block(field, [1], [layers], -a)
+      call table%file%create(path, .false.)
+      do i = 0, 3
+        call table%begin(merge(creating, appending, i == 0))
+        call table%field('/field', 'm', [layers], [1], [layers], -a)
       end do
-      call file%close()
+      call table%file%close()
     end if
     call meet()
-    call file%open(path, .true., .true.)
-    call file%open_column('/field', file_real32, field)
-    call file%resize(field, 2_i8)
-    call file%append_block(field, [first], [last - first + 1], a(first:last))
-    call file%close()
-    call check_file('a file of one process goes on', file)
+    call table%file%open(path, .true., .true.)
+    call table%begin(reopening)
+    call table%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
+    call table%keep(2)
+    call table%begin(appending)
+    call table%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
+    call table%file%close()
+    call check_file('a file of one process goes on', table%file)
     if (.not. is_root()) return
-    call file%open(path, .false., .false.)
-    call file%open_column('/field', file_real32, field)
-    call file%read_row(field, 3, x)
+    call table%file%open(path, .false., .false.)
+    call table%file%read_block('/field', [1, 3], [layers, 1], x)
     call check('the new row stands in it', x, real(a, wp), 0.0_wp)
-    call file%close()
+    call table%file%close()
   end subroutine test_go_on_together
 
   !> No row takes more than it has asked for, compressed or not, however large the index grows.
   subroutine test_room()
-    type(h5_file_t) :: file
-    type(h5_column_t) :: time, field, place
+    type(table_t) :: table
     integer, parameter :: rows = 2500, n = 96
     integer(i8) :: before, after, capacity
     real(sp) :: noise(n)
+    real(wp) :: place(3, 400)
     integer :: i, row, too_large
     logical :: grew
 
     if (.not. is_root()) return
     call remove(path)
-    call file%create(path, .false.)
-    call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
-    call file%new_compressed_column('/field', 'm', file_real32, [3, n/3], [9, 1], field)
-    call file%new_column('/place', 'm', file_real64, [3, 400], 8, place)
-    call file%flush()
+    call table%file%create(path, .false.)
     too_large = 0
     grew = .false.
-    inquire (file=path, size=before)
-    do row = 1, rows
-      capacity = bytes_for_change + time%bytes_for(1) + field%bytes_for(1) + place%bytes_for(1)
+    place = 1.0_wp
+    do row = 0, rows
       noise = [(real(mod(sin(real(row*n + i, wp))*43758.5453_wp, 1.0_wp), sp), i=1, n)]
-      call file%append(time, [1.0_wp*row])
-      call file%append_block(field, [1, 1], [3, n/3], noise)
-      call file%append(place, [(1.0_wp*i, i=1, 1200)])
-      call file%flush()
+      capacity = 0
+      if (row > 0) capacity = table%bytes_for_row()
+      inquire (file=path, size=before)
+      call table%begin(merge(creating, appending, row == 0))
+      call table%column('/time', 's', 1.0_wp*row)
+      call table%field('/field', 'm', [3, n/3], [1, 1], [3, n/3], noise)
+      call table%column('/place', 'm', place)
+      call table%file%flush()
       inquire (file=path, size=after)
-      if (after > before + capacity) too_large = too_large + 1
-      grew = grew .or. after > before + 50000
-      before = after
+      if (row > 0 .and. after > before + capacity) too_large = too_large + 1
+      grew = grew .or. (row > 0 .and. after > before + 50000)
     end do
-    call file%close()
-    call check_file('many rows are written', file)
+    call table%file%close()
+    call check_file('many rows are written', table%file)
     call check('rows that take more room than they asked for', too_large, 0)
     call check('some rows take much room', grew)
   end subroutine test_room
@@ -319,7 +334,6 @@ contains
   !> Without room nothing is written but the last word, and the file stays whole.
   subroutine test_no_room()
     type(h5_file_t) :: file
-    type(h5_column_t) :: time
     real(wp) :: x(2)
     integer(i8) :: before, after
     integer :: n
@@ -328,8 +342,7 @@ contains
     call remove(path)
     call file%create(path, .false.)
     call file%attribute('/', 'exit_status', -1)
-    call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
-    call file%append_rows(time, 2, [1.0_wp, 2.0_wp])
+    call file%store('/time', 's', [1.0_wp, 2.0_wp])
     call file%flush()
     inquire (file=path, size=before)
     call limit_files(before + 100)
@@ -339,7 +352,7 @@ contains
     call check('and named', index(file%message, path//': cannot write: ') == 1)
     inquire (file=path, size=after)
     call check('the file is as long as before', after == before)
-    call file%append(time, [3.0_wp])
+    call file%store('/more', 's', [3.0_wp])
     call file%last_integer('/', 'exit_status', 4)
     call file%close()
     call file%open(path, .false., .false.)
@@ -388,16 +401,21 @@ contains
     call check('the other file keeps its length', after == before)
     call file%create(path, .false.)
     call check('a file that is there is not overwritten', file%info /= 0)
-    call file%abandon()
+    call file%close()
     call file%open(kept, .false., .false.)
     call check('the moved file has what was written', file%has('/c'))
     call file%close()
     call remove(path)
     call file%create(path, .false.)
     if (c_rename(kept//c_null_char, path//c_null_char) /= 0) error stop 'rename'
-    call file%abandon()
+    inquire (file=path, size=before)
+    call limit_files(before + 100)
+    call file%reserve(before + 1000)
+    call limit_files(-1_i8)
+    call check('a file that could not be begun', file%info /= 0)
+    call file%close()
     call file%open(path, .false., .false.)
-    call check('nor is it deleted in place of the moved one', file%has('/a'))
+    call check('is not deleted by the name of another', file%has('/a'))
     call file%close()
     call check_file('files are held, not named', file)
   end subroutine test_another_in_its_place

@@ -1,0 +1,397 @@
+!> A file with a table: columns, datasets that grow by rows and get one each time.
+!!
+!! Its writer lists the columns once, in a procedure that gives each its name, unit and the values
+!! of this moment:
+!!
+!!     call file%begin(appending)
+!!     call file%column('/bodies/time', 's', t)
+!!     call file%column('/bodies/position', 'm', x)
+!!
+!! The same list creates the columns (`creating`: the values only show the shape of a row), finds
+!! them in a file that goes on (`reopening`) and appends a row to each (`appending`). The first
+!! column is the time. A row is the last index of a dataset, for h5py the first.
+module table_m
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_associated
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+  use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND
+  use hdf5, only: h5dread_f, h5dset_extent_f, h5dwrite_f, h5dget_create_plist_f, h5pclose_f
+  use hdf5, only: h5pcreate_f, h5pget_chunk_f, h5pget_nfilters_f, h5pset_alloc_time_f
+  use hdf5, only: h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_value_f, h5pset_fletcher32_f
+  use hdf5, only: h5pset_shuffle_f, h5sclose_f, h5tget_size_f
+  use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5P_DATASET_CREATE_F, H5T_NATIVE_DOUBLE
+  use hdf5, only: H5T_NATIVE_INTEGER, H5T_NATIVE_REAL
+  use kinds_m, only: wp, sp, i8
+  use parallel_m, only: is_root
+  use hdf5_file_m, only: h5_file_t
+  use file_space_m, only: bytes_for_change, bytes_for_chunks
+  implicit none
+  private
+  public :: table_t, creating, reopening, appending
+
+  integer, parameter :: creating = 1, reopening = 2, appending = 3
+  integer, parameter :: deflate_level = 1      !! higher levels cost time and gain little on fields
+  integer, parameter :: field_bytes = 2**18    !! of a compressed field
+  integer, parameter :: min_chunk_rows = 8
+
+  type :: column_t
+    character(:), allocatable :: name, units
+    integer(hid_t) :: type = -1        !! of its elements, in memory and in the file
+    integer, allocatable :: row(:)     !! shape of a row; empty: a number
+    integer :: per_row = 1             !! rows of the column in a row of the table
+    integer :: layers = 0              !! of a chunk: it is compressed; 0: it is not
+    integer(hid_t) :: id = -1
+    integer(hsize_t), allocatable :: extent(:)   !! of the dataset; the last is the number of rows
+    integer(hsize_t), allocatable :: chunk(:)    !! shape of the pieces that are stored
+  end type column_t
+
+  type :: table_t
+    type(h5_file_t) :: file
+    integer :: rows = 0
+    integer :: chunk_bytes = 2**14     !! of a column that is not compressed
+    logical :: up_to_date = .false.    !! a run that goes on has a row of its very start
+    integer, private :: mode = creating
+    integer, private :: at = 0         !! column that was listed last
+    type(column_t), allocatable, private :: list(:)
+  contains
+    procedure, private :: number, vectors, integers, wide_number, wide_numbers, next
+    generic :: column => number, vectors, integers, wide_number, wide_numbers
+    procedure :: points, cells, field
+    procedure :: begin, find_rows, keep, bytes_for_row, read_row
+  end type table_t
+
+contains
+
+  !> Begin to list the columns.
+  subroutine begin(self, mode)
+    class(table_t), intent(inout) :: self
+    integer, intent(in) :: mode   !! creating, reopening, appending
+
+    self%mode = mode
+    self%at = 0
+    if (mode /= appending) self%list = [column_t ::]
+  end subroutine begin
+
+  !> The next column: create it, find it in the file, or append a row to it.
+  subroutine next(self, column, data)
+    class(table_t), intent(inout) :: self
+    type(column_t), intent(in) :: column
+    type(c_ptr), intent(in) :: data   !! its values; null: the caller writes them
+    type(column_t) :: new
+
+    self%at = self%at + 1
+    if (self%file%info /= 0) return
+    if (self%mode == appending) then
+      call append(self%file, self%list(self%at), data)
+      return
+    end if
+    new = column
+    if (self%mode == reopening) call open_column(self%file, new)
+    if (self%mode == creating) call create_column(self%file, self%chunk_bytes, new)
+    self%list = [self%list, new]
+  end subroutine next
+
+  !> A number.
+  subroutine number(self, name, units, x)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target :: x
+
+    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, [integer ::]), c_loc(x))
+  end subroutine number
+
+  !> Vectors, one of each block.
+  subroutine vectors(self, name, units, x)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: x(:, :)   !! (components, blocks)
+
+    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, shape(x)), c_loc(x))
+  end subroutine vectors
+
+  !> Integers, one of each block.
+  subroutine integers(self, name, units, n)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in), target, contiguous :: n(:)
+
+    call self%next(column_t(name, units, H5T_NATIVE_INTEGER, shape(n)), c_loc(n))
+  end subroutine integers
+
+  !> An integer of 64 bits, the kind that VTK uses for numbers of points and cells.
+  subroutine wide_number(self, name, units, n)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer(i8), intent(in), target :: n
+
+    call self%next(column_t(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [integer ::]), &
+                   c_loc(n))
+  end subroutine wide_number
+
+  subroutine wide_numbers(self, name, units, n)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer(i8), intent(in), target, contiguous :: n(:)
+
+    call self%next(column_t(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(n)), c_loc(n))
+  end subroutine wide_numbers
+
+  !> Vectors of points, which follow one another in the file; compressed.
+  subroutine points(self, name, units, single, x)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    logical, intent(in) :: single     !! precision in the file
+    real(wp), intent(in), target, contiguous :: x(:, :)   !! (3, points)
+    real(sp), allocatable, target :: short(:, :)
+
+    if (single) then
+      allocate (short(3, size(x, 2)), source=real(x, sp))
+      call self%next(column_t(name, units, H5T_NATIVE_REAL, [3], size(x, 2), 3), c_loc(short))
+    else
+      call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, [3], size(x, 2), 3), c_loc(x))
+    end if
+  end subroutine points
+
+  !> Integers of cells, which follow one another in the file.
+  subroutine cells(self, name, units, n)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in), target, contiguous :: n(:)
+
+    call self%next(column_t(name, units, H5T_NATIVE_INTEGER, [integer ::], size(n)), c_loc(n))
+  end subroutine cells
+
+  !> Numbers of the cells of a grid in single precision, of which this process gives a block;
+  !! compressed. All processes together write them.
+  subroutine field(self, name, units, whole, first, extent, a)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: whole(:)              !! shape of the field
+    integer, intent(in) :: first(:), extent(:)   !! of the block
+    real(sp), intent(in), target, contiguous :: a(:)   !! its elements in a row
+    integer(hid_t) :: there, here
+    integer :: status, layers
+
+    layers = max(1, field_bytes/(4*product(whole(:size(whole) - 1))))
+    call self%next(column_t(name, units, H5T_NATIVE_REAL, whole, 1, &
+                            min(layers, whole(size(whole)))), c_null_ptr)
+    if (self%mode /= appending .or. self%file%info /= 0) return
+    associate (file => self%file, column => self%list(self%at))
+      call file%select(name, column%id, [int(first - 1, hsize_t), last_row(column)], &
+                       [int(extent, hsize_t), 1_hsize_t], there, here)
+      if (file%info /= 0) return
+      call h5dwrite_f(column%id, column%type, c_loc(a), status, here, there, file%transfer)
+      call file%check(status, 'write '//name)
+      call h5sclose_f(there, status)
+      call h5sclose_f(here, status)
+    end associate
+  end subroutine field
+
+  !> Number of the last row, from 0.
+  pure integer(hsize_t) function last_row(column)
+    type(column_t), intent(in) :: column
+
+    last_row = column%extent(size(column%extent)) - 1
+  end function last_row
+
+  !> Create a column without rows. Chunks of whole rows are written in place at once; those of a
+  !! column that is compressed must be written whole.
+  subroutine create_column(file, chunk_bytes, column)
+    type(h5_file_t), intent(inout) :: file
+    integer, intent(in) :: chunk_bytes   !! if it is not compressed
+    type(column_t), intent(inout) :: column
+    integer(hid_t) :: list
+    integer :: status(6), rows
+
+    rows = max(min_chunk_rows, chunk_bytes/(8*max(1, product(column%row))))
+    if (column%per_row > 1 .or. column%layers > 0) rows = column%per_row
+    column%extent = int([column%row, 0], hsize_t)
+    column%chunk = int([max(1, column%row), rows], hsize_t)
+    if (column%layers > 0) column%chunk(size(column%row)) = int(column%layers, hsize_t)
+    status = 0
+    call h5pcreate_f(H5P_DATASET_CREATE_F, list, status(1))
+    call h5pset_chunk_f(list, size(column%chunk), column%chunk, status(2))
+    if (column%layers > 0) then
+      call h5pset_shuffle_f(list, status(3))
+      call h5pset_deflate_f(list, deflate_level, status(4))
+      call h5pset_fletcher32_f(list, status(5))   ! a chunk that was changed on the disk is not read
+      call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status(6))   ! many processes need it
+    end if
+    call file%check(minval(status), 'create '//column%name)
+    call set_fill(file, column, list)
+    call file%new_dataset(column%name, column%units, column%type, column%extent, list, column%id)
+    call h5pclose_f(list, status(1))
+  end subroutine create_column
+
+  !> What a row that never arrived shows: NaN, or -1 for integers.
+  subroutine set_fill(file, column, list)
+    type(h5_file_t), intent(inout) :: file
+    type(column_t), intent(in) :: column
+    integer(hid_t), intent(in) :: list
+    real(wp), target :: nothing
+    real(sp), target :: nothing_single
+    integer, target :: none
+    integer :: status
+
+    nothing = ieee_value(nothing, ieee_quiet_nan)
+    nothing_single = ieee_value(nothing_single, ieee_quiet_nan)
+    none = -1
+    if (column%type == H5T_NATIVE_DOUBLE) then
+      call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status)
+    else if (column%type == H5T_NATIVE_REAL) then
+      call h5pset_fill_value_f(list, H5T_NATIVE_REAL, c_loc(nothing_single), status)
+    else
+      call h5pset_fill_value_f(list, H5T_NATIVE_INTEGER, c_loc(none), status)
+    end if
+    call file%check(status, 'create '//column%name)
+  end subroutine set_fill
+
+  !> Open a column of a file that exists.
+  subroutine open_column(file, column)
+    type(h5_file_t), intent(inout) :: file
+    type(column_t), intent(inout) :: column
+    integer(hid_t) :: list
+    integer :: status, filters
+
+    call file%find(column%name, column%type, column%id, column%extent)
+    if (file%info /= 0) return
+    allocate (column%chunk, mold=column%extent)
+    call h5dget_create_plist_f(column%id, list, status)
+    call file%check(status, 'open '//column%name)
+    if (file%info /= 0) return
+    call h5pget_chunk_f(list, size(column%chunk), column%chunk, status)
+    call file%check(status, 'open '//column%name)
+    call h5pget_nfilters_f(list, filters, status)
+    call file%check(status, 'open '//column%name)
+    column%layers = merge(int(column%chunk(max(1, size(column%chunk) - 1))), 0, filters > 0)
+    call h5pclose_f(list, status)
+  end subroutine open_column
+
+  !> Give a column this many rows: later ones are dropped, missing ones have the fill value.
+  subroutine resize(file, column, rows)
+    type(h5_file_t), intent(inout) :: file
+    type(column_t), intent(inout) :: column
+    integer(hsize_t), intent(in) :: rows
+    integer :: status
+
+    if (file%info /= 0) return
+    column%extent(size(column%extent)) = rows
+    call h5dset_extent_f(column%id, column%extent, status)
+    call file%check(status, 'write '//column%name)
+  end subroutine resize
+
+  !> Append a row of the table; of a shared file the root process writes it.
+  subroutine append(file, column, data)
+    type(h5_file_t), intent(inout) :: file
+    type(column_t), intent(inout) :: column
+    type(c_ptr), intent(in) :: data   !! null: the caller writes it
+    integer(hsize_t) :: first(size(column%extent)), extent(size(column%extent))
+    integer(hid_t) :: there, here
+    integer :: status
+
+    first = 0
+    first(size(first)) = last_row(column) + 1
+    extent = [int(column%row, hsize_t), int(column%per_row, hsize_t)]
+    call resize(file, column, last_row(column) + 1 + column%per_row)
+    if (.not. c_associated(data) .or. product(extent) == 0) return
+    if (file%shared .and. .not. is_root()) return
+    call file%select(column%name, column%id, first, extent, there, here)
+    if (file%info /= 0) return
+    call h5dwrite_f(column%id, column%type, data, status, here, there)
+    call file%check(status, 'write '//column%name)
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+  end subroutine append
+
+  !> Rows that a run keeps which goes on, those that it has counted, and one more if that one is of
+  !! this very time; later ones stay until `keep`.
+  subroutine find_rows(self, counted, time)
+    class(table_t), intent(inout) :: self
+    integer, intent(in) :: counted   !! by the run
+    real(wp), intent(in) :: time     !! [s]
+    real(wp) :: last(1)
+    integer :: row
+
+    self%rows = counted
+    self%up_to_date = .false.
+    if (self%file%info /= 0) return
+    associate (there => int(last_row(self%list(1))) + 1, file => self%file)
+      if (there < counted) then
+        file%info = 1
+        file%message = file%path//': has lost rows, the run cannot go on in it'
+      end if
+      do row = max(1, counted), min(counted + 1, there)
+        call self%read_row(self%list(1)%name, row, last)
+        if (file%info /= 0 .or. abs(last(1) - time) > 0.0_wp) cycle
+        self%rows = row
+        self%up_to_date = .true.
+      end do
+    end associate
+  end subroutine find_rows
+
+  !> Give the table so many rows.
+  subroutine keep(self, rows)
+    class(table_t), intent(inout) :: self
+    integer, intent(in) :: rows
+    integer :: c
+
+    self%rows = rows
+    if (self%file%info /= 0) return
+    do c = 1, size(self%list)
+      call resize(self%file, self%list(c), int(rows, hsize_t)*self%list(c)%per_row)
+    end do
+  end subroutine keep
+
+  !> Most that another row takes at the end of the file [bytes].
+  function bytes_for_row(self) result(bytes)
+    class(table_t), intent(in) :: self
+    integer(i8) :: bytes
+    integer(i8) :: layers, before, after
+    integer(size_t) :: element
+    integer :: c, n, status
+
+    bytes = bytes_for_change
+    if (self%file%info /= 0) return
+    do c = 1, size(self%list)
+      associate (column => self%list(c), extent => int(self%list(c)%extent, i8), &
+        chunk => int(self%list(c)%chunk, i8))
+        n = size(extent)
+        call h5tget_size_f(column%type, element, status)
+        layers = product((extent(:n - 1) + chunk(:n - 1) - 1)/chunk(:n - 1))
+        before = layers*((extent(n) + chunk(n) - 1)/chunk(n))
+        after = layers*((extent(n) + column%per_row + chunk(n) - 1)/chunk(n))
+        bytes = bytes + bytes_for_chunks(product(chunk)*int(element, i8), column%layers > 0, &
+          before, after - before, n)
+      end associate
+    end do
+  end function bytes_for_row
+
+  !> Row number `row` (from 1) of a column of reals.
+  subroutine read_row(self, name, row, a)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: row
+    real(wp), intent(inout), target, contiguous :: a(:)
+    integer(hsize_t), allocatable :: first(:), extent(:)
+    integer(hid_t) :: there, here
+    type(c_ptr) :: data
+    integer :: c, status
+
+    if (self%file%info /= 0 .or. size(a) == 0) return
+    do c = 1, size(self%list)
+      if (self%list(c)%name /= name) cycle
+      associate (column => self%list(c))
+        extent = [column%extent(:size(column%extent) - 1), 1_hsize_t]
+        first = 0*extent
+        first(size(first)) = int(row - 1, hsize_t)
+        call self%file%select(name, column%id, first, extent, there, here)
+        if (self%file%info /= 0) return
+        data = c_loc(a)
+        call h5dread_f(column%id, H5T_NATIVE_DOUBLE, data, status, here, there)
+        call self%file%check(status, 'read '//name)
+        call h5sclose_f(there, status)
+        call h5sclose_f(here, status)
+      end associate
+    end do
+  end subroutine read_row
+
+end module table_m
