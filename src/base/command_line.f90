@@ -94,7 +94,7 @@ contains
       if (has_value) then
         value = word(equals + 1:)
         word = word(:equals - 1)
-      else if ((wants_value(word) .or. word == '--help') .and. i < size(arguments)) then
+      else if ((len(needs(word)) > 0 .or. word == '--help') .and. i < size(arguments)) then
         if (index(arguments(i + 1)%text, '--') /= 1) then
           i = i + 1
           value = arguments(i)%text
@@ -107,15 +107,19 @@ contains
       'goes with --check')
   end subroutine parse_arguments
 
-  !> Does the option need a word behind it?
-  pure logical function wants_value(word)
+  !> What an option needs behind it; empty: nothing.
+  pure function needs(word) result(what)
     character(*), intent(in) :: word
+    character(:), allocatable :: what
 
     select case (word)
-    case ('--plan', '--restart', '--output', '--threads', '--max-wall'); wants_value = .true.
-    case default; wants_value = .false.
+    case ('--plan', '--restart'); what = 'a file name'
+    case ('--output'); what = 'a folder'
+    case ('--threads'); what = 'a number'
+    case ('--max-wall'); what = 'hours and minutes, HH:MM,'
+    case default; what = ''
     end select
-  end function wants_value
+  end function needs
 
   !> One option with its value, if it has one.
   subroutine take_option(word, has_value, value, options, problems)
@@ -123,18 +127,19 @@ contains
     logical, intent(in) :: has_value
     type(options_t), intent(inout) :: options
     type(problems_t), intent(inout) :: problems
+    integer :: n, info
 
     if (all(known /= word)) then
       call problems%add_message("unknown option '"//word//"'; the nearest is " &
         //nearest_name(word, known)//' (see --help)')
       return
     end if
-    if (has_value .and. .not. (wants_value(word) .or. word == '--help')) then
+    if (has_value .and. len(needs(word)) == 0 .and. word /= '--help') then
       call problems%add_message('option '//word//" takes no value, got '"//value//"'")
       return
     end if
-    if (wants_value(word) .and. len(value) == 0) then
-      call problems%add_message('option '//word//' needs '//what_value(word)//' behind it')
+    if (len(needs(word)) > 0 .and. len(value) == 0) then
+      call problems%add_message('option '//word//' needs '//needs(word)//' behind it')
       return
     end if
     select case (word)
@@ -147,38 +152,18 @@ contains
       options%topic = value
     case ('--restart'); options%restart = value
     case ('--output'); options%output = value
-    case ('--threads'); call take_threads(value, options, problems)
+    case ('--threads')
+      n = 0
+      call parse_integer(value, n, info)
+      if (info /= value_ok .or. n < 1 .or. n > max_threads) then
+        call problems%add('--threads', value, allowed_threads)
+      else
+        options%threads = n
+      end if
     case ('--max-wall'); call take_max_wall(value, options, problems)
     case default; error stop 'take_option: an option is known but not handled'
     end select
   end subroutine take_option
-
-  pure function what_value(word) result(what)
-    character(*), intent(in) :: word
-    character(:), allocatable :: what
-
-    select case (word)
-    case ('--plan', '--restart'); what = 'a file name'
-    case ('--output'); what = 'a folder'
-    case ('--max-wall'); what = 'hours and minutes, HH:MM,'
-    case default; what = 'a number'
-    end select
-  end function what_value
-
-  subroutine take_threads(value, options, problems)
-    character(*), intent(in) :: value
-    type(options_t), intent(inout) :: options
-    type(problems_t), intent(inout) :: problems
-    integer :: n, info
-
-    n = 0
-    call parse_integer(value, n, info)
-    if (info /= value_ok .or. n < 1 .or. n > max_threads) then
-      call problems%add('--threads', value, allowed_threads)
-    else
-      options%threads = n
-    end if
-  end subroutine take_threads
 
   !> Hours and minutes, perhaps seconds: 12:00, 0:30, 1:30:00.
   subroutine take_max_wall(value, options, problems)

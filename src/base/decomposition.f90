@@ -56,11 +56,13 @@ contains
   elemental function grain(n, pieces) result(g)
     integer, intent(in) :: n, pieces
     integer :: g
-    integer :: power
+    integer :: power, shortest, i
 
     g = 0
     do power = 0, 4
-      if (shortest_piece(n, pieces, 2**power) < min_cells .and. pieces > 1) cycle
+      shortest = minval([(cut(n, pieces, 2**power, i) - cut(n, pieces, 2**power, i - 1), &
+                          i=1, pieces)])
+      if (shortest < min_cells .and. pieces > 1) cycle
       if (power > 2 .and. g > 0) then
         if (longest_piece(n, pieces, 2**power) > longest_piece(n, pieces, g)) cycle
       end if
@@ -92,13 +94,5 @@ contains
 
     length = maxval([(cut(n, pieces, g, i) - cut(n, pieces, g, i - 1), i=1, pieces)])
   end function longest_piece
-
-  elemental function shortest_piece(n, pieces, g) result(length)
-    integer, intent(in) :: n, pieces, g
-    integer :: length
-    integer :: i
-
-    length = minval([(cut(n, pieces, g, i) - cut(n, pieces, g, i - 1), i=1, pieces)])
-  end function shortest_piece
 
 end module decomposition_m

@@ -26,8 +26,7 @@ module errors_m
     integer :: n = 0   !! number of problems
     type(message_t), allocatable, private :: list(:)
   contains
-    procedure, private :: add_integer, add_real, add_logical, add_character
-    generic :: add => add_integer, add_real, add_logical, add_character
+    procedure :: add => add_value
     procedure :: add_message
     procedure :: message => problems_message
     procedure :: report => problems_report
@@ -40,49 +39,24 @@ module errors_m
 
 contains
 
-  !> Note that `what` has the integer `value` and what would be allowed.
-  subroutine add_integer(self, what, value, allowed, line)
+  !> Note what value `what` has and what would be allowed.
+  subroutine add_value(self, what, value, allowed, line)
     class(problems_t), intent(inout) :: self
     character(*), intent(in) :: what       !! group and variable, like '&run dt'
-    integer, intent(in) :: value
+    class(*), intent(in) :: value          !! integer, real, logical or text
     character(*), intent(in) :: allowed    !! what is wrong and what is allowed
     integer, intent(in), optional :: line  !! line of the case file
+    character(:), allocatable :: text
 
-    call self%add_message(what//' = '//to_text(value)//': '//allowed, line)
-  end subroutine add_integer
-
-  !> Note that `what` has the real `value` and what would be allowed.
-  subroutine add_real(self, what, value, allowed, line)
-    class(problems_t), intent(inout) :: self
-    character(*), intent(in) :: what
-    real(wp), intent(in) :: value
-    character(*), intent(in) :: allowed
-    integer, intent(in), optional :: line
-
-    call self%add_message(what//' = '//to_text(value)//': '//allowed, line)
-  end subroutine add_real
-
-  !> Note that `what` has the logical `value` and what would be allowed.
-  subroutine add_logical(self, what, value, allowed, line)
-    class(problems_t), intent(inout) :: self
-    character(*), intent(in) :: what
-    logical, intent(in) :: value
-    character(*), intent(in) :: allowed
-    integer, intent(in), optional :: line
-
-    call self%add_message(what//' = '//to_text(value)//': '//allowed, line)
-  end subroutine add_logical
-
-  !> Note that `what` has the text `value` and what would be allowed.
-  subroutine add_character(self, what, value, allowed, line)
-    class(problems_t), intent(inout) :: self
-    character(*), intent(in) :: what
-    character(*), intent(in) :: value
-    character(*), intent(in) :: allowed
-    integer, intent(in), optional :: line
-
-    call self%add_message(what//" = '"//trim(value)//"': "//allowed, line)
-  end subroutine add_character
+    select type (value)
+    type is (integer); text = to_text(value)
+    type is (real(wp)); text = to_text(value)
+    type is (logical); text = to_text(value)
+    type is (character(*)); text = "'"//trim(value)//"'"
+    class default; error stop 'add_value: no such kind of value'
+    end select
+    call self%add_message(what//' = '//text//': '//allowed, line)
+  end subroutine add_value
 
   !> Note a problem in free words.
   subroutine add_message(self, text, line)

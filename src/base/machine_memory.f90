@@ -15,7 +15,7 @@ contains
   function available_memory() result(bytes)
     integer(i8) :: bytes
 
-    bytes = 1024*kilobytes_in('/proc/meminfo', 'MemAvailable:')
+    bytes = 1024*number_after('MemAvailable:', '/proc/meminfo', 0_i8)
     if (bytes > 0) bytes = min(bytes, group_limit())
   end function available_memory
 
@@ -26,59 +26,35 @@ contains
     integer(i8) :: bytes
     integer(i8) :: memory
 
-    bytes = address_limit()
-    memory = kilobytes_in('/proc/meminfo', 'MemTotal:')
-    if (memory > 0) bytes = min(bytes, 1024*(memory + kilobytes_in('/proc/meminfo', 'SwapTotal:')))
+    bytes = number_after('Max address space', '/proc/self/limits', huge(bytes))
+    memory = number_after('MemTotal:', '/proc/meminfo', 0_i8)
+    if (memory > 0) bytes = min(bytes, 1024*(memory &
+                                             + number_after('SwapTotal:', '/proc/meminfo', 0_i8)))
   end function memory_limit
 
-  !> Limit of the address space of this process [B]; the largest number if there is none.
-  function address_limit() result(bytes)
-    integer(i8) :: bytes
-    character(*), parameter :: name = 'Max address space'
-    character(:), allocatable :: row
+  !> The number after a name at the beginning of a row of a file, or `otherwise`.
+  function number_after(name, file, otherwise) result(number)
+    character(*), intent(in) :: name   !! empty: the number in the first row
+    character(*), intent(in) :: file
+    integer(i8), intent(in) :: otherwise
+    integer(i8) :: number
     integer(i8) :: found
-    integer :: status
-
-    bytes = huge(bytes)
-    row = row_of('/proc/self/limits', name)
-    if (len(row) == 0) return
-    read (row, *, iostat=status) found   ! `unlimited` is no number
-    if (status == 0) bytes = found
-  end function address_limit
-
-  !> The number after a name at the beginning of a row of a file; 0 if there is none.
-  function kilobytes_in(file, name) result(kilobytes)
-    character(*), intent(in) :: file, name
-    integer(i8) :: kilobytes
-    character(:), allocatable :: row
-    integer :: status
-
-    kilobytes = 0
-    row = row_of(file, name)
-    if (len(row) == 0) return
-    read (row, *, iostat=status) kilobytes
-    if (status /= 0) kilobytes = 0
-  end function kilobytes_in
-
-  !> What follows a name at the beginning of a row of a file; empty if there is none.
-  function row_of(file, name) result(text)
-    character(*), intent(in) :: file, name
-    character(:), allocatable :: text
     character(120) :: row
     integer :: unit, status
 
-    text = ''
+    number = otherwise
     open (newunit=unit, file=file, action='read', status='old', iostat=status)
     if (status /= 0) return
     do
       read (unit, '(a)', iostat=status) row
       if (status /= 0) exit
       if (index(row, name) /= 1) cycle
-      text = trim(row(len(name) + 1:))
+      read (row(len(name) + 1:), *, iostat=status) found   ! `max`, `unlimited` are no numbers
+      if (status == 0) number = found
       exit
     end do
     close (unit)
-  end function row_of
+  end function number_after
 
   !> The lowest limit of the control groups around this process [B]; without any the largest number.
   !! Lines of /proc/self/cgroup are number:controllers:path, without controllers in version 2.
@@ -117,25 +93,10 @@ contains
     bytes = huge(bytes)
     n = len(path)
     do while (n >= 0)
-      bytes = min(bytes, number_in(top//path(:n)//'/'//name))
+      bytes = min(bytes, number_after('', top//path(:n)//'/'//name, huge(bytes)))
       if (n == 0) exit
       n = max(0, index(path(:n), '/', back=.true.) - 1)
     end do
   end function lowest_limit
-
-  !> The number in a file; the largest one if there is none.
-  function number_in(file) result(n)
-    character(*), intent(in) :: file
-    integer(i8) :: n
-    integer(i8) :: found
-    integer :: unit, status
-
-    n = huge(n)
-    open (newunit=unit, file=file, action='read', status='old', iostat=status)
-    if (status /= 0) return
-    read (unit, *, iostat=status) found   ! `max` is no number
-    if (status == 0) n = found
-    close (unit)
-  end function number_in
 
 end module machine_memory_m

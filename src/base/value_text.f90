@@ -32,7 +32,7 @@ contains
     real(wp), intent(inout) :: x      !! changed only when `info` is `value_ok`
     integer, intent(out) :: info
     character(len(text)) :: word
-    integer :: mantissa_end, exponent, power, status
+    integer :: mantissa_end, exponent, first, point, power, status
 
     word = lower_case(text)
     info = value_malformed
@@ -47,12 +47,18 @@ contains
       call small_integer(word(mantissa_end + 2:), exponent)
       word(mantissa_end + 1:mantissa_end + 1) = 'e'
     end if
-    call leading_power(word(:mantissa_end), power)
-    if (power == -huge(0)) then      ! zero, whatever the exponent
+    first = scan(word(:mantissa_end), '123456789')
+    if (first == 0) then      ! zero, whatever the exponent
       word = word(:mantissa_end)
-    else if (abs(power + exponent) > largest_exponent) then
-      info = value_too_large
-      return
+    else
+      point = index(word(:mantissa_end), '.')
+      if (point == 0) point = mantissa_end + 1
+      power = point - first   ! of ten, of the first digit that is not zero
+      if (power > 0) power = power - 1
+      if (abs(power + exponent) > largest_exponent) then
+        info = value_too_large
+        return
+      end if
     end if
     read (word, *, iostat=status) x
     if (status == 0) info = value_ok
@@ -299,20 +305,5 @@ contains
     end do
     if (word(1:1) == '-') n = -n
   end subroutine small_integer
-
-  !> Power of ten of the first digit that is not zero; `-huge(0)` for zero itself.
-  pure subroutine leading_power(mantissa, power)
-    character(*), intent(in) :: mantissa   !! a checked decimal number
-    integer, intent(out) :: power
-    integer :: first, point
-
-    power = -huge(0)
-    first = scan(mantissa, '123456789')
-    if (first == 0) return
-    point = index(mantissa, '.')
-    if (point == 0) point = len(mantissa) + 1
-    power = point - first
-    if (power > 0) power = power - 1
-  end subroutine leading_power
 
 end module value_text_m
