@@ -106,6 +106,7 @@ contains
     type(points_t) :: points
     type(parts_t) :: parts
     real(wp) :: waist, middle, ends(3, 8, 2)
+    integer :: k
 
     points%same = same_point*height
     waist = dolos_waist*height
@@ -115,7 +116,21 @@ contains
                    reshape([-unit(:, 1), unit(:, 3), unit(:, 2)], [3, 3]), points, parts)
     ends(:, :, 1) = octagon(unit(:, 1), unit(:, 2), unit(:, 3), -middle + 0.5_wp*waist, waist)
     ends(:, :, 2) = octagon(unit(:, 1), unit(:, 2), unit(:, 3), middle - 0.5_wp*waist, waist)
-    call add_shank(ends, points, parts)
+    ! The shank between the two flukes; each of its ends meets a flat side and two wedges.
+    call begin_part(parts)
+    do k = 1, 8
+      call add_face(reshape([ends(:, k, 1), ends(:, 1 + mod(k, 8), 1), ends(:, 1 + mod(k, 8), 2), &
+                             ends(:, k, 2)], [3, 4]), points, parts)
+    end do
+    ! Corners 1 to 8 from 22.5 degrees: 2, 3, 6, 7 lie near the second axis, which is that of the
+    ! first fluke; 1, 4, 5, 8 near the first, that of the second.
+    call add_face(ends(:, [2, 3, 6, 7], 1), points, parts)
+    call add_face(ends(:, [1, 2, 7, 8], 1), points, parts)
+    call add_face(ends(:, [3, 4, 5, 6], 1), points, parts)
+    call add_face(ends(:, [1, 4, 5, 8], 2), points, parts)
+    call add_face(ends(:, [1, 2, 3, 4], 2), points, parts)
+    call add_face(ends(:, [5, 6, 7, 8], 2), points, parts)
+    call end_part(points, parts)
     call assemble(points, parts, parts, refinement, shape)
   end subroutine build_dolos
 
@@ -317,29 +332,6 @@ contains
       call end_part(points, parts)
     end subroutine wedge
   end subroutine add_fluke
-
-  !> The shank between the two flukes; each of its ends meets a flat side and two wedges.
-  pure subroutine add_shank(ends, points, parts)
-    real(wp), intent(in) :: ends(3, 8, 2)
-    type(points_t), intent(inout) :: points
-    type(parts_t), intent(inout) :: parts
-    integer :: k
-
-    call begin_part(parts)
-    do k = 1, 8
-      call add_face(reshape([ends(:, k, 1), ends(:, 1 + mod(k, 8), 1), ends(:, 1 + mod(k, 8), 2), &
-                             ends(:, k, 2)], [3, 4]), points, parts)
-    end do
-    ! Corners 1 to 8 from 22.5 degrees: 2, 3, 6, 7 lie near the second axis, which is that of the
-    ! first fluke; 1, 4, 5, 8 near the first, that of the second.
-    call add_face(ends(:, [2, 3, 6, 7], 1), points, parts)
-    call add_face(ends(:, [1, 2, 7, 8], 1), points, parts)
-    call add_face(ends(:, [3, 4, 5, 6], 1), points, parts)
-    call add_face(ends(:, [1, 4, 5, 8], 2), points, parts)
-    call add_face(ends(:, [1, 2, 3, 4], 2), points, parts)
-    call add_face(ends(:, [5, 6, 7, 8], 2), points, parts)
-    call end_part(points, parts)
-  end subroutine add_shank
 
   !> Tetrahedra and surface of a block from its parts in the fewest pieces and in finer ones.
   pure subroutine assemble(points, coarse, fine, n_cuts, shape)

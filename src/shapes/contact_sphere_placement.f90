@@ -10,7 +10,7 @@ module contact_sphere_placement_m
   use tet_mesh_m, only: shape_t, opposite
   implicit none
   private
-  public :: place_at_centroids, place_inscribed, place_one_sphere, height_errors
+  public :: place_at_centroids, place_inscribed, height_errors
 
 contains
 
@@ -64,15 +64,6 @@ contains
     at_surface(shape%triangle_tet) = .true.
     tet = pack([(t, t=1, size(at_surface))], at_surface)
   end subroutine find_tets_at_surface
-
-  !> A sphere touches as a sphere: one contact sphere of the true radius.
-  pure subroutine place_one_sphere(radius, shape)
-    real(wp), intent(in) :: radius   !! [m]
-    type(shape_t), intent(inout) :: shape
-
-    allocate (shape%sphere_centre(3, 1), source=0.0_wp)
-    allocate (shape%sphere_radius(1), source=radius)
-  end subroutine place_one_sphere
 
   !> How far the contact spheres reach short of the block, and beyond it, over all directions [m].
   !!

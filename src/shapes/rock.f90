@@ -40,15 +40,36 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(inout) :: shape
     logical, intent(out) :: found   !! a stone of this blockiness
-    type(polyhedron_t) :: stone
+    type(polyhedron_t) :: stone, form
     type(points_t) :: points
     type(parts_t) :: parts
-    integer :: first(max_corners + 2), corner(6*max_corners), n_faces, f
-    real(wp) :: volume, moment(3)
+    integer :: first(max_corners + 2), corner(6*max_corners), n_faces, f, try, v, k
+    real(wp) :: volume, moment(3), normal(3, n_planes), weight(n_planes), edge, longest, width
 
-    call draw_form(input, stone)
+    ! A stone of any volume with its box along the axes. Of some draws the first without short edges
+    ! counts, or the one whose shortest is longest.
+    longest = -1.0_wp
+    do try = 1, max_tries
+      call draw_planes(input, try, normal, weight)
+      call cut_to_blockiness(input%blockiness, normal, weight, form)
+      if (form%n == 0) cycle
+      edge = huge(edge)
+      do v = 1, form%n
+        do k = 1, 3
+          edge = min(edge, norm2(form%x(:, form%adjacent(k, v)) - form%x(:, v)))
+        end do
+      end do
+      if (edge <= longest) cycle
+      longest = edge
+      stone%n = form%n
+      stone%x(:, :form%n) = form%x(:, :form%n)
+      stone%adjacent(:, :form%n) = form%adjacent(:, :form%n)
+      if (edge >= min_edge) exit
+    end do
     found = stone%n > 0
     if (.not. found) return
+    width = input%elongation**(0.2_wp + 0.6_wp*uniform(input%seed, input%member, k_width))
+    call stretch([input%elongation, width, 1.0_wp], stone)
     call polyhedron_moments(stone, volume, moment)
     stone%x(:, :stone%n) = stone%x(:, :stone%n) &
       *(rock_mass(input, input%member)/(input%density*volume))**(1.0_wp/3.0_wp)
@@ -101,39 +122,6 @@ contains
     if (input%mass_max > 0.0_wp) share = share - share_above(input, input%mass_max)
   end function share_in_grade
 
-  !> A stone of any volume with its box along the axes. Of some draws the first without short edges
-  !! counts, or the one whose shortest is longest.
-  pure subroutine draw_form(input, stone)
-    type(shape_input_t), intent(in) :: input
-    type(polyhedron_t), intent(out) :: stone
-    type(polyhedron_t) :: form
-    real(wp) :: normal(3, n_planes), weight(n_planes), edge, longest, width
-    integer :: try, v, k
-
-    longest = -1.0_wp
-    do try = 1, max_tries
-      call draw_planes(input, try, normal, weight)
-      call cut_to_blockiness(input%blockiness, normal, weight, form)
-      if (form%n == 0) cycle
-      ! Length of the shortest edge.
-      edge = huge(edge)
-      do v = 1, form%n
-        do k = 1, 3
-          edge = min(edge, norm2(form%x(:, form%adjacent(k, v)) - form%x(:, v)))
-        end do
-      end do
-      if (edge <= longest) cycle
-      longest = edge
-      stone%n = form%n
-      stone%x(:, :form%n) = form%x(:, :form%n)
-      stone%adjacent(:, :form%n) = form%adjacent(:, :form%n)
-      if (edge >= min_edge) exit
-    end do
-    if (stone%n == 0) return
-    width = input%elongation**(0.2_wp + 0.6_wp*uniform(input%seed, input%member, k_width))
-    call stretch([input%elongation, width, 1.0_wp], stone)
-  end subroutine draw_form
-
   !> Normals of the planes of a stone, faces of the cube first, and how much each takes part in the
   !! cutting; the faces do not.
   pure subroutine draw_planes(input, try, normal, weight)
@@ -161,7 +149,10 @@ contains
         weight(p) = 0.5_wp + 0.5_wp*u(4)
         slope = swing
       else
-        normal(:, p) = edge_direction(mod(first + 5*(p - 15), 12))
+        k = mod(first + 5*(p - 15), 12)   ! towards the middle of one of the twelve edges of a cube
+        d = k/4
+        normal(1 + mod(d, 3), p) = merge(1.0_wp, -1.0_wp, btest(k, 0))/sqrt(2.0_wp)
+        normal(1 + mod(d + 1, 3), p) = merge(1.0_wp, -1.0_wp, btest(k, 1))/sqrt(2.0_wp)
         weight(p) = 0.4_wp + 0.25_wp*u(4)
         slope = swing
       end if
@@ -169,18 +160,6 @@ contains
       normal(:, p) = normal(:, p)/norm2(normal(:, p))
     end do
   end subroutine draw_planes
-
-  !> Unit vector from the centre of a cube to the middle of one of its twelve edges.
-  pure function edge_direction(number) result(e)
-    integer, intent(in) :: number   !! 0 .. 11
-    real(wp) :: e(3)
-    integer :: d
-
-    d = number/4
-    e = 0.0_wp
-    e(1 + mod(d, 3)) = merge(1.0_wp, -1.0_wp, btest(number, 0))/sqrt(2.0_wp)
-    e(1 + mod(d + 1, 3)) = merge(1.0_wp, -1.0_wp, btest(number, 1))/sqrt(2.0_wp)
-  end function edge_direction
 
   !> The stone of these planes with the wanted blockiness, in a box of edge 1; empty if there is
   !! none. The deeper the cuts, the less is left of the box.

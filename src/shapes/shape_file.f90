@@ -71,7 +71,7 @@ contains
     real(wp), allocatable, intent(inout) :: point(:, :)
     integer, allocatable, intent(inout) :: tet(:, :)
     character(:), allocatable :: word
-    integer :: n
+    integer :: n, i, k
 
     call get_integer(words, n)
     if (n /= 1) call report(words, 'mics-shape '//to_text(n)//' is unknown, this program reads 1')
@@ -80,11 +80,30 @@ contains
       select case (word)
       case ('points')
         if (allocated(point)) call report(words, '''points'' stands a second time')
-        call read_points(words, point)
+        call get_count(words, 'points', 3, n)
+        if (len(words%problem) > 0) return
+        allocate (point(3, n))
+        do i = 1, n
+          do k = 1, 3
+            call get_real(words, point(k, i))
+          end do
+          if (len(words%problem) > 0) return
+        end do
       case ('tets')
         if (.not. allocated(point)) call report(words, '''tets'' stands before any ''points''')
         if (allocated(tet)) call report(words, '''tets'' stands a second time')
-        call read_tets(words, point, tet)
+        call get_count(words, 'tetrahedra', 4, n)
+        if (len(words%problem) > 0) return
+        allocate (tet(4, n))
+        do i = 1, n
+          do k = 1, 4
+            call get_integer(words, tet(k, i))
+            if (tet(k, i) < 1 .or. tet(k, i) > size(point, 2)) then
+              call report(words, 'there is no point '//to_text(tet(k, i)))
+            end if
+            if (len(words%problem) > 0) return
+          end do
+        end do
       case ('')
         return
       case default
@@ -92,44 +111,6 @@ contains
       end select
     end do
   end subroutine read_own
-
-  !> Count and coordinates of the points; none are kept after a problem.
-  subroutine read_points(words, point)
-    type(words_t), intent(inout) :: words
-    real(wp), allocatable, intent(inout) :: point(:, :)   !! (3, n)
-    integer :: n, i, k
-
-    call get_count(words, 'points', 3, n)
-    if (len(words%problem) > 0) return
-    allocate (point(3, n))
-    do i = 1, n
-      do k = 1, 3
-        call get_real(words, point(k, i))
-      end do
-      if (len(words%problem) > 0) return
-    end do
-  end subroutine read_points
-
-  !> Count and corners of the tetrahedra.
-  subroutine read_tets(words, point, tet)
-    type(words_t), intent(inout) :: words
-    real(wp), allocatable, intent(in) :: point(:, :)
-    integer, allocatable, intent(inout) :: tet(:, :)   !! (4, n)
-    integer :: n, i, k
-
-    call get_count(words, 'tetrahedra', 4, n)
-    if (len(words%problem) > 0) return
-    allocate (tet(4, n))
-    do i = 1, n
-      do k = 1, 4
-        call get_integer(words, tet(k, i))
-        if (tet(k, i) < 1 .or. tet(k, i) > size(point, 2)) then
-          call report(words, 'there is no point '//to_text(tet(k, i)))
-        end if
-        if (len(words%problem) > 0) return
-      end do
-    end do
-  end subroutine read_tets
 
   !> A .msh file after its first word.
   subroutine read_gmsh(words, point, tet)

@@ -12,7 +12,7 @@ module shapes_builtin_m
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
   use rock_m, only: build_rock, share_in_grade
-  use contact_sphere_placement_m, only: place_at_centroids, place_inscribed, place_one_sphere
+  use contact_sphere_placement_m, only: place_at_centroids, place_inscribed
   use dense_spheres_m, only: place_densely
   use shape_file_m, only: read_shape_file
   use mesh_check_m, only: check_mesh
@@ -101,7 +101,8 @@ contains
 
     message = ''
     if (shape%kind == 'sphere') then
-      call place_one_sphere(0.5_wp*input%size(1), shape)
+      allocate (shape%sphere_centre(3, 1), source=0.0_wp)
+      allocate (shape%sphere_radius(1), source=0.5_wp*input%size(1))   ! the true radius
       return
     end if
     select case (trim(input%spheres))
@@ -254,6 +255,7 @@ contains
   pure function problem_with(input) result(message)
     type(shape_input_t), intent(in) :: input
     character(:), allocatable :: message
+    real(wp) :: parts, most
 
     message = ''
     select case (trim(input%kind))
@@ -268,16 +270,8 @@ contains
     if (input%refinement < 1 .or. input%refinement > max_refinement) then
       message = 'refinement must be 1 to 8'
     end if
-    if (len(message) == 0) message = too_slender(input)
-  end function problem_with
-
-  !> What is wrong with the proportions of a box or a cylinder, which say how finely it is cut.
-  pure function too_slender(input) result(message)
-    type(shape_input_t), intent(in) :: input
-    character(:), allocatable :: message
-    real(wp) :: parts, most
-
-    message = ''
+    if (len(message) > 0) return
+    ! the proportions of a box or a cylinder say how finely it is cut
     select case (trim(input%kind))
     case ('box')
       parts = product(anint(input%size/minval(input%size)))
@@ -292,7 +286,7 @@ contains
         //' diameters with refinement = '//to_text(input%refinement)
     case default   ! of given proportions, or measured when it is made
     end select
-  end function too_slender
+  end function problem_with
 
   !> What says how large a block is, as the case may have it: `size = 1, 2`, `file = 'stone'`.
   pure function given_size(input) result(text)

@@ -33,7 +33,8 @@ contains
     type(net_t) :: net
     integer, allocatable :: region(:), new_facet(:), new_point(:)
     logical, allocatable :: done(:)
-    integer :: n, f
+    integer :: n, f, e, g, a, b
+    logical :: joined, changed
 
     n = size(facet) - 1
     net%near = flat*maxval(maxval(point, 2) - minval(point, 2))
@@ -54,7 +55,23 @@ contains
       if (.not. done(region(f))) net%label(f) = f
     end do
     call gather(facet, net)
-    call join_pieces(facet, region, done, net)
+    ! Join neighbours in the regions not done wherever the two are convex together, until no more
+    ! can be.
+    do
+      changed = .false.
+      do e = 1, size(net%owner)
+        f = net%owner(e)
+        if (done(region(f)) .or. net%twin(e) == 0) cycle
+        g = net%owner(net%twin(e))
+        if (region(f) /= region(g) .or. net%label(f) == net%label(g)) cycle
+        a = merge(net%label(f), net%label(g), &
+                  net%members(net%label(f)) >= net%members(net%label(g)))
+        b = net%label(f) + net%label(g) - a
+        call try_to_join(facet, a, b, net, joined)
+        changed = changed .or. joined
+      end do
+      if (.not. changed) exit
+    end do
     call write_net(facet_point, size(point, 2), net, new_facet, new_point)
     call move_alloc(new_facet, facet)
     call move_alloc(new_point, facet_point)
@@ -179,32 +196,6 @@ contains
       end associate
     end do
   end subroutine gather
-
-  !> Join neighbours in the regions not done wherever the two are convex together, until no more
-  !! can be.
-  pure subroutine join_pieces(facet, region, done, net)
-    integer, intent(in) :: facet(:), region(:)
-    logical, intent(in) :: done(:)             !! of each region
-    type(net_t), intent(inout) :: net
-    integer :: e, f, g, a, b
-    logical :: joined, changed
-
-    do
-      changed = .false.
-      do e = 1, size(net%owner)
-        f = net%owner(e)
-        if (done(region(f)) .or. net%twin(e) == 0) cycle
-        g = net%owner(net%twin(e))
-        if (region(f) /= region(g) .or. net%label(f) == net%label(g)) cycle
-        a = merge(net%label(f), net%label(g), &
-                  net%members(net%label(f)) >= net%members(net%label(g)))
-        b = net%label(f) + net%label(g) - a
-        call try_to_join(facet, a, b, net, joined)
-        changed = changed .or. joined
-      end do
-      if (.not. changed) exit
-    end do
-  end subroutine join_pieces
 
   !> Give piece b the label of a, if the two are convex together.
   pure subroutine try_to_join(facet, a, b, net, joined)

@@ -129,7 +129,17 @@ contains
               do s = 0, 1
                 f(1:3) = c + s*unit_step(:, d)
                 f(4) = d
-                call narrow(f, 0.5_wp*more(d, cut))
+                associate (aperture => solid%aperture(f(1), f(2), f(3), d), &
+                           effective => solid%effective(f(1), f(2), f(3), d))
+                  if (aperture < least .or. closed_side(grid, f(d), d)) cycle
+                  if (effective >= aperture) then
+                    call ensure_capacity(next, solid%held_face)
+                    call ensure_capacity(next, solid%held_share)
+                    solid%held_face(:, next) = f
+                    next = next + 1
+                  end if
+                  effective = aperture/(aperture/effective + 0.5_wp*more(d, cut))   ! w/w_free
+                end associate
               end do
             end do
           end associate
@@ -137,24 +147,6 @@ contains
       end do
     end do
     solid%first_held(n) = next
-  contains
-    !> Add to w/w_free of face f.
-    subroutine narrow(f, part)
-      integer, intent(in) :: f(4)
-      real(wp), intent(in) :: part
-
-      associate (aperture => solid%aperture(f(1), f(2), f(3), f(4)), &
-                 effective => solid%effective(f(1), f(2), f(3), f(4)))
-        if (aperture < least .or. closed_side(grid, f(f(4)), f(4))) return
-        if (effective >= aperture) then
-          call ensure_capacity(next, solid%held_face)
-          call ensure_capacity(next, solid%held_share)
-          solid%held_face(:, next) = f
-          next = next + 1
-        end if
-        effective = aperture/(aperture/effective + part)
-      end associate
-    end subroutine narrow
   end subroutine narrow_faces
 
   !> Is another body than b, the owner of cell c, in this cell or one of the 26 around? There the

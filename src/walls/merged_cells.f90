@@ -77,7 +77,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
-    integer :: m, c(3)
+    integer :: m, d, c(3), e(3)
+    logical :: has_fluid
 
     if (solid%poses > 0 .and. self%poses == solid%poses) return
     self%poses = solid%poses
@@ -88,7 +89,13 @@ contains
     self%n = 0
     do m = 1, solid%n_cut
       c = solid%cut_cell(:, m)
-      if (is_small(grid, solid, c)) call add_cell(c, solid%inside(c(1), c(2), c(3)), self)
+      if (solid%inside(c(1), c(2), c(3)) == 0 .or. .not. is_near(grid, c, halo_layers)) cycle
+      has_fluid = any(solid%aperture(c(1), c(2), c(3), :) > 0.0_wp)
+      do d = 1, 3
+        e = c + unit_step(:, d)
+        has_fluid = has_fluid .or. solid%aperture(e(1), e(2), e(3), d) > 0.0_wp
+      end do
+      if (has_fluid) call add_cell(c, solid%inside(c(1), c(2), c(3)), self)
     end do
     self%n_small = self%n
     call add_cut_cells(grid, solid, self)
@@ -101,23 +108,6 @@ contains
     call ensure_capacity(2*solid%n_link, self%wall_speed)
     self%wall_speed = 0.0_wp
   end subroutine find_merged_cells
-
-  !> Is a cut cell a small cell of this process or of the halo that matters?
-  pure function is_small(grid, solid, c) result(yes)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    logical :: yes
-    integer :: d, e(3)
-
-    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, halo_layers)
-    if (.not. yes) return
-    yes = any(solid%aperture(c(1), c(2), c(3), :) > 0.0_wp)
-    do d = 1, 3
-      e = c + unit_step(:, d)
-      yes = yes .or. solid%aperture(e(1), e(2), e(3), d) > 0.0_wp
-    end do
-  end function is_small
 
   !> In the domain, and an own cell or one of the layers of the halo that matter.
   pure function is_near(grid, c, layers) result(yes)
