@@ -167,7 +167,13 @@ contains
         associate (point => points%item(t))
           v_n = dot_product(relative_velocity(motion, point%arm_a, point%arm_b), point%normal)
           part = 1.0_wp
-          if (groups%new(g)) part = damped_part(point%depth, v_n, dt)
+          ! Time since a new contact point began up to the end of the substep, over the substep: 1/2
+          ! to 3/2. Damping sets in with a jump. A contact point is seen first when bodies touch in
+          ! the middle of a substep, and may have begun up to a substep before.
+          if (groups%new(g)) then
+            part = 1.0_wp
+            if (v_n < 0.0_wp) part = 0.5_wp + min(point%depth, -v_n*dt)/(-v_n*dt)
+          end if
           opening = opening_speed(point, law%gamma_n, motion)
           force_n = normal_force(r%elastic(t), part*r%eta(t), opening) &
             /slowing_of(part*r%decay(t)*dt)
@@ -195,19 +201,6 @@ contains
 
     s = max(1.0_wp + d, 2*d)
   end function slowing_of
-
-  !> Time since a new contact point began up to the end of the substep, over the substep: 1/2 to
-  !! 3/2.
-  !!
-  !! Damping sets in with a jump. A contact point is seen first when bodies touch in the middle of a
-  !! substep, and may have begun up to a substep before.
-  pure function damped_part(depth, v_n, dt) result(part)
-    real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
-    real(wp) :: part
-
-    part = 1.0_wp
-    if (v_n < 0.0_wp) part = 0.5_wp + min(depth, -v_n*dt)/(-v_n*dt)
-  end function damped_part
 
   !> Tangential force of one group, no larger than friction allows.
   !!

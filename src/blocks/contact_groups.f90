@@ -38,7 +38,9 @@ contains
       groups%n = g
       groups%first(g) = t
       do last = t, points%n - 1
-        if (.not. same_displacement(points%item(t), points%item(last + 1))) exit
+        associate (p => points%item(t), q => points%item(last + 1))
+          if (p%id /= q%id .or. p%b /= q%b .or. p%a /= q%a) exit   ! not of one displacement
+        end associate
       end do
       groups%normal(:, g) = points%item(t)%normal
       groups%arm_a(:, g) = points%item(t)%arm_a
@@ -49,14 +51,6 @@ contains
     end do
     groups%first(groups%n + 1) = points%n + 1
   end subroutine form_groups
-
-  !> Whether two contact points act on one tangential displacement.
-  pure function same_displacement(one, two) result(yes)
-    type(contact_point_t), intent(in) :: one, two
-    logical :: yes
-
-    yes = one%id == two%id .and. one%b == two%b .and. one%a == two%a
-  end function same_displacement
 
   !> Mean normal and point of some contact points, weighted by overlap.
   pure subroutine take_mean(point, normal, arm_a, arm_b)

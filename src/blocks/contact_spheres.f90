@@ -381,7 +381,9 @@ contains
     type(contact_point_t) :: point
     integer :: c, s, w
 
-    w = findloc_wall(walls, self%list%b(p))
+    do w = 1, walls%n
+      if (walls%number(w) == self%list%b(p)) exit
+    end do
     point%a = self%list%a(p)
     point%b = self%list%b(p)
     point%normal = walls%normal(:, w)
@@ -425,17 +427,6 @@ contains
       call add_point(point, points)
     end do
   end subroutine add_bed_points
-
-  !> Place of a wall in the list of walls.
-  pure function findloc_wall(walls, number) result(w)
-    type(walls_t), intent(in) :: walls
-    integer, intent(in) :: number   !! -6..-1
-    integer :: w
-
-    do w = 1, walls%n
-      if (walls%number(w) == number) return
-    end do
-  end function findloc_wall
 
   !> Contact points of pair p of bodies. The contact lies in the middle of the overlap.
   subroutine add_body_points(blocks, self, p, gap, points)

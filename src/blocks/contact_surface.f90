@@ -208,7 +208,7 @@ contains
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(inout) :: self
-    integer :: p, n_old
+    integer :: p, n_old, m
 
     n_old = self%near%n
     call ensure_capacity(n_old, self%old_slot)
@@ -222,27 +222,7 @@ contains
     call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%wide_skin, &
       self%near)
     call ensure_capacity(self%near%n, self%slot)
-    call keep_slots(n_old, self)
-    call take_slots(self)
-    do p = 1, self%near%n
-      associate (pair => self%pairs(self%slot(p)))
-        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) call forget(pair)
-        pair%shift = self%near%shift(:, p)
-      end associate
-    end do
-    self%listed = .true.
-    self%live_listed = .false.
-    self%listed_skin = self%wide_skin
-    self%present = blocks%present
-    self%x = blocks%x
-  end subroutine list_pairs
-
-  !> Give each pair that was listed before its place, others none yet.
-  pure subroutine keep_slots(n_old, self)
-    integer, intent(in) :: n_old                 !! pairs listed before
-    type(contact_surface_t), intent(inout) :: self
-    integer :: p, m
-
+    ! Give each pair that was listed before its place, others none yet.
     self%taken = .false.
     m = 1
     do p = 1, self%near%n
@@ -257,12 +237,25 @@ contains
       self%slot(p) = self%old_slot(m)
       self%taken(self%slot(p)) = .true.
     end do
-  end subroutine keep_slots
+    call take_slots(self)
+    do p = 1, self%near%n
+      associate (pair => self%pairs(self%slot(p)))
+        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) call forget(pair)
+        pair%shift = self%near%shift(:, p)
+      end associate
+    end do
+    self%listed = .true.
+    self%live_listed = .false.
+    self%listed_skin = self%wide_skin
+    self%present = blocks%present
+    self%x = blocks%x
+  end subroutine list_pairs
 
   !> Give a free place to each pair without one.
   subroutine take_slots(self)
     type(contact_surface_t), intent(inout) :: self
-    integer :: p, place
+    integer :: p, place, m
+    type(pair_t), allocatable :: longer(:)
 
     place = 1
     do p = 1, self%near%n
@@ -271,7 +264,14 @@ contains
         if (.not. self%taken(place)) exit
         place = place + 1
       end do
-      call ensure_pairs(place, self)
+      m = size(self%pairs)
+      if (place > m) then
+        allocate (longer(max(place, 2*m, 16)))
+        longer(:m) = self%pairs
+        call move_alloc(longer, self%pairs)
+        call ensure_capacity(size(self%pairs), self%taken)
+        self%taken(m + 1:) = .false.
+      end if
       self%taken(place) = .true.
       self%slot(p) = place
       self%pairs(place)%a = self%near%a(p)
@@ -287,22 +287,6 @@ contains
     pair%near%valid = -1.0_wp
     pair%close%left = -1.0_wp
   end subroutine forget
-
-  !> Make room for n pairs.
-  subroutine ensure_pairs(n, self)
-    integer, intent(in) :: n
-    type(contact_surface_t), intent(inout) :: self
-    type(pair_t), allocatable :: longer(:)
-    integer :: m
-
-    m = size(self%pairs)
-    if (n <= m) return
-    allocate (longer(max(n, 2*m, 16)))
-    longer(:m) = self%pairs
-    call move_alloc(longer, self%pairs)
-    call ensure_capacity(size(self%pairs), self%taken)
-    self%taken(m + 1:) = .false.
-  end subroutine ensure_pairs
 
   !> Contact points of body a and wall w: its corners, or its lowest point where it is a sphere.
   subroutine add_wall_points(walls, blocks, a, w, gap, self, points)

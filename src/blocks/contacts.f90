@@ -7,7 +7,7 @@ module contacts_m
   use rigid_body_m, only: blocks_t, begin_step, drift, kick_body, hold_sleepers, look_ahead, &
     follow_motions, find_speeds
   use walls_m, only: walls_t
-  use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, all_still
+  use sleep_m, only: update_stillness, store_poses, store_quiet, put_to_sleep, all_still
   use lubrication_m, only: lubricate
   use counterparts_m, only: update_counterparts, update_motion
   use acting_bodies_m, only: list_present
@@ -179,9 +179,10 @@ contains
                          blocks)
           call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
                          b, blocks)
+          ! sleepers had the velocity of the middle of the substep, and have none at its end
+          if (blocks%asleep(b)) call put_to_sleep(b, blocks)
         end associate
       end do
-      call stop_sleepers(acting, blocks)
       call update_motion(blocks, acting, detected%counterparts)
       call integrate_displacements(0.5_wp*dt_b, detected, displacements)
     end associate

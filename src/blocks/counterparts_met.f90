@@ -34,7 +34,9 @@ contains
         if (.not. comes_before(met%a(m), met%b(m), 0, a, b, 0)) exit
         m = m + 1
       end do
-      if (is_met(met, m, a, b)) cycle
+      if (m <= met%n) then
+        if (met%a(m) == a .and. met%b(m) == b) cycle
+      end if
       call ensure_capacity(met%n + 1, met%a)
       call ensure_capacity(met%n + 1, met%b)
       met%a(m + 1:met%n + 1) = met%a(m:met%n)
@@ -44,16 +46,6 @@ contains
       met%n = met%n + 1
     end do
   end subroutine store_counterparts
-
-  !> Whether entry m of the pairs met is the pair (a, b).
-  pure function is_met(met, m, a, b) result(yes)
-    type(met_t), intent(in) :: met
-    integer, intent(in) :: m, a, b
-    logical :: yes
-
-    yes = m <= met%n
-    if (yes) yes = met%a(m) == a .and. met%b(m) == b
-  end function is_met
 
   !> Number of counterparts each body met in this step, and whether the floor was one of them.
   pure subroutine count_counterparts(met, blocks)

@@ -24,7 +24,7 @@ contains
     type(drop_input_t), intent(in) :: drop
     integer, intent(in) :: index       !! 1 .. drop%count
     type(place_t) :: place
-    real(wp) :: angle
+    real(wp) :: angle, axis(3), height, azimuth
     integer :: d
 
     if (allocated(drop%row)) then
@@ -50,8 +50,11 @@ contains
       place%q = random_rotation(drop%seed, index)
     case ('given')
       angle = uniform(drop%seed, index, k_tilt)*drop%tilt_deg*pi/180.0_wp
-      place%q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), &
-        place%q)
+      ! An axis uniform over the sphere: the height is uniform and so is the azimuth.
+      height = 2*uniform(drop%seed, index, k_tilt + 1) - 1.0_wp
+      azimuth = 2*pi*uniform(drop%seed, index, k_tilt + 2)
+      axis = [sqrt(1.0_wp - height**2)*[cos(azimuth), sin(azimuth)], height]
+      place%q = quaternion_product(quaternion_from_axis(axis, angle), place%q)
     case default; error stop 'place_of_block: no such orientation'
     end select
   end function place_of_block
@@ -134,16 +137,5 @@ contains
     end do
     s = 0
   end function draw_shape
-
-  !> A unit vector, uniform over the sphere: the height is uniform and so is the azimuth.
-  pure function random_axis(seed, index) result(axis)
-    integer, intent(in) :: seed, index
-    real(wp) :: axis(3)
-    real(wp) :: height, azimuth
-
-    height = 2*uniform(seed, index, k_tilt + 1) - 1.0_wp
-    azimuth = 2*pi*uniform(seed, index, k_tilt + 2)
-    axis = [sqrt(1.0_wp - height**2)*[cos(azimuth), sin(azimuth)], height]
-  end function random_axis
 
 end module drops_m

@@ -103,7 +103,7 @@ contains
     type(displacements_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
-    integer :: t, m, r
+    integer :: t, m, r, b
 
     call copy_counterparts(detected%counterparts, blocks, rows)
     call reserve_rows(detected%points%n, rows)
@@ -132,7 +132,14 @@ contains
       end associate
     end do
     rows%first(rows%n_pairs + 1) = rows%n + 1
-    call list_active(blocks%n, rows)
+    ! List the counterparts that have rows and move.
+    rows%n_active = 0
+    do b = bed_counterpart, blocks%n
+      if (.not. rows%busy(b)) cycle
+      if (rows%inverse_mass(b) <= 0.0_wp .and. all(abs(rows%v(:, b)) <= 0.0_wp)) cycle
+      rows%n_active = rows%n_active + 1
+      rows%active(rows%n_active) = b
+    end do
     call colour_pairs(rows)
   end subroutine make_rows
 
@@ -300,21 +307,6 @@ contains
     row%stretch(1) = dot_product(memory%xi(:, m), row%e1)
     row%stretch(2) = dot_product(memory%xi(:, m), row%e2)
   end subroutine recall
-
-  !> List the counterparts that have rows and move.
-  pure subroutine list_active(n, rows)
-    integer, intent(in) :: n                     !! bodies
-    type(rows_t), intent(inout) :: rows
-    integer :: b
-
-    rows%n_active = 0
-    do b = bed_counterpart, n
-      if (.not. rows%busy(b)) cycle
-      if (rows%inverse_mass(b) <= 0.0_wp .and. all(abs(rows%v(:, b)) <= 0.0_wp)) cycle
-      rows%n_active = rows%n_active + 1
-      rows%active(rows%n_active) = b
-    end do
-  end subroutine list_active
 
   !> Give each pair the first colour that none of its bodies has yet, and sort the pairs by colour.
   pure subroutine colour_pairs(rows)

@@ -160,6 +160,8 @@ contains
     integer, intent(in) :: n
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
+    real(wp) :: by_film(3)
+    integer :: k
 
     associate (detected => contacts%detected, rows => contacts%rows, loads => contacts%loads)
       detected%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
@@ -174,7 +176,22 @@ contains
         contacts%lubrication, loads%film)
       call make_rows(h, contacts%contact_time, detected, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
-        call fall_freely(gravity, step, contacts, blocks, rows)
+        ! Accelerations of all bodies with rows but for contact, at the start of the step. An impact
+        ! in the step returns the speed that the films leave.
+        do k = 1, rows%n_active
+          associate (b => rows%active(k))
+            rows%a_free(:, b) = 0.0_wp
+            if (b > 0) then
+              if (blocks%path(b)%n > 0) rows%a_free(:, b) = change_by_motion(blocks, b, step)/step
+            end if
+            if (rows%inverse_mass(b) <= 0.0_wp) cycle
+            by_film = rows%inverse_mass(b)*contacts%loads%film(:, b)
+            rows%v_start(1:3, b) = rows%v_start(1:3, b) + step*by_film
+            rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
+            rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), &
+              blocks%fluid_torque(:, b) - cross(blocks%omega(:, b), blocks%l(:, b)))
+          end associate
+        end do
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
         call restore(contacts%restitution, slow_hit*norm(gravity)*step, rows)
       end if
@@ -182,32 +199,6 @@ contains
       loads%force = loads%force + loads%film
     end associate
   end subroutine solve_step
-
-  !> Accelerations of all bodies with rows but for contact, at the start of the step. An impact in
-  !! the step returns the speed that the films leave.
-  pure subroutine fall_freely(gravity, step, contacts, blocks, rows)
-    real(wp), intent(in) :: gravity(3), step   !! [m/s2, s]
-    type(contacts_t), intent(in) :: contacts
-    type(blocks_t), intent(in) :: blocks
-    type(rows_t), intent(inout) :: rows
-    real(wp) :: by_film(3)
-    integer :: k
-
-    do k = 1, rows%n_active
-      associate (b => rows%active(k))
-        rows%a_free(:, b) = 0.0_wp
-        if (b > 0) then
-          if (blocks%path(b)%n > 0) rows%a_free(:, b) = change_by_motion(blocks, b, step)/step
-        end if
-        if (rows%inverse_mass(b) <= 0.0_wp) cycle
-        by_film = rows%inverse_mass(b)*contacts%loads%film(:, b)
-        rows%v_start(1:3, b) = rows%v_start(1:3, b) + step*by_film
-        rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
-        rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), blocks%fluid_torque(:, b) &
-          - cross(blocks%omega(:, b), blocks%l(:, b)))
-      end associate
-    end do
-  end subroutine fall_freely
 
   !> Move the bodies by what was found, book the impulses, remember the contact points.
   subroutine finish_step(gravity, step, h, contacts, blocks, report)
@@ -217,7 +208,8 @@ contains
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
     real(wp) :: force(3)
-    integer :: b
+    integer :: b, k, r
+    logical :: touched(contacts%rows%n_pairs)
 
     blocks%time = blocks%time + step
     associate (rows => contacts%rows, loads => contacts%loads)
@@ -235,20 +227,7 @@ contains
       end do
       loads%impulse = loads%impulse + step*loads%force
       loads%twist = loads%twist + step*loads%torque
-      call report_rows(step, contacts, report)
-      call store_memory(h, contacts%detected%points, rows, contacts%displacements)
-    end associate
-  end subroutine finish_step
-
-  !> Counterparts that touched, how deep at the start of the step, and how far they came in it.
-  subroutine report_rows(step, contacts, report)
-    real(wp), intent(in) :: step   !! [s]
-    type(contacts_t), intent(inout) :: contacts
-    type(contact_report_t), intent(inout) :: report
-    logical :: touched(contacts%rows%n_pairs)
-    integer :: k, r
-
-    associate (rows => contacts%rows)
+      ! Counterparts that touched, how deep at the start of the step, and how far they came in it.
       do k = 1, rows%n_pairs
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
@@ -259,9 +238,10 @@ contains
           end do
         end associate
       end do
-      call store_counterparts(pack(rows%a(:rows%n_pairs), touched), &
-                          pack(rows%b(:rows%n_pairs), touched), contacts%met)
+      call store_counterparts(pack(rows%a(:rows%n_pairs), touched), pack(rows%b(:rows%n_pairs), &
+        touched), contacts%met)
+      call store_memory(h, contacts%detected%points, rows, contacts%displacements)
     end associate
-  end subroutine report_rows
+  end subroutine finish_step
 
 end module impulse_step_m

@@ -36,7 +36,7 @@ contains
     real(wp), intent(in) :: push_max   !! largest speed with which overlaps open [m/s]
     type(rows_t), intent(inout) :: rows
     real(wp) :: change, largest
-    integer :: s, i, k, left
+    integer :: s, i, k, left, r
 
     call apply_remembered(rows)
     do s = 1, n
@@ -51,7 +51,12 @@ contains
           rows%way(:, b) = rows%way(:, b) + h*rows%v(:, b)
         end associate
       end do
-      call follow_way(rows)
+      ! Let the rows follow the bodies.
+      do k = 1, rows%n_pairs
+        do r = rows%first(k), rows%first(k + 1) - 1
+          rows%row(r)%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), rows%row(r))
+        end do
+      end do
       call sweep(h, push_max, .false., mod(s, 2) == 0, rows, largest)
       change = max(change, largest)
       do k = 1, rows%n_active
@@ -63,25 +68,16 @@ contains
       if (change < settled*h .and. s < n) then
         if (balanced(h, rows)) left = n - s + 1
       end if
-      call add_totals(left, rows)
+      ! Count the impulses of a sub-sweep, so many times.
+      do r = 1, rows%n
+        rows%total(:, r) = rows%total(:, r) + real(left, wp)*rows%row(r)%impulse
+      end do
       if (left > 1) then
         call go_on(h, left - 1, rows)
         exit
       end if
     end do
   end subroutine solve_rows
-
-  !> Let the rows follow the bodies.
-  pure subroutine follow_way(rows)
-    type(rows_t), intent(inout) :: rows
-    integer :: k, r
-
-    do k = 1, rows%n_pairs
-      do r = rows%first(k), rows%first(k + 1) - 1
-        rows%row(r)%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), rows%row(r))
-      end do
-    end do
-  end subroutine follow_way
 
   !> Change of the velocities by the impulses remembered.
   pure subroutine apply_remembered(rows)
@@ -293,17 +289,6 @@ contains
     end do
     yes = .true.
   end function balanced
-
-  !> Count the impulses of a sub-sweep, so many times.
-  pure subroutine add_totals(times, rows)
-    integer, intent(in) :: times
-    type(rows_t), intent(inout) :: rows
-    integer :: r
-
-    do r = 1, rows%n
-      rows%total(:, r) = rows%total(:, r) + real(times, wp)*rows%row(r)%impulse
-    end do
-  end subroutine add_totals
 
   !> Let all go on through so many sub-sweeps with the impulses of the last one.
   pure subroutine go_on(h, times, rows)

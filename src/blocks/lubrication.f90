@@ -61,8 +61,8 @@ contains
       !! (3, counterparts) of all counterparts [N]
     real(wp), parameter :: round_off = 1.0e-9_wp
     logical :: active(blocks%n)
-    real(wp) :: f(3)
-    integer :: a, b, p
+    real(wp) :: f(3), n(3), gap, sides, opening
+    integer :: a, b, p, w
 
     active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
     associate (near => lubrication%near)
@@ -79,34 +79,21 @@ contains
           force(:, a) = force(:, a) + f
           p = p + 1
         end do
-        call films_at_walls(walls, blocks, a, dt, ahead, lubrication, force)
+        ! Films between sphere a and the walls. A slip wall is a mirror: behind it comes a second
+        ! sphere, as fast, at twice the gap.
+        do w = 1, walls%n
+          n = walls%normal(:, w)
+          gap = walls%offset(w) - dot_product(n, blocks%x(:, a)) - lubrication%radius(a)
+          sides = merge(2.0_wp, 1.0_wp, walls%slip(w))
+          opening = -sides*dot_product(n, blocks%v(:, a))
+          f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap + ahead*opening, &
+                   opening, sides*inverse_mass(blocks, a), dt)*n
+          force(:, a) = force(:, a) - f
+          force(:, walls%number(w)) = force(:, walls%number(w)) + f
+        end do
       end do
     end associate
   end subroutine lubricate
-
-  !> Films between sphere a and the walls. A slip wall is a mirror: behind it comes a second sphere,
-  !! as fast, at twice the gap.
-  pure subroutine films_at_walls(walls, blocks, a, dt, ahead, lubrication, force)
-    type(walls_t), intent(in) :: walls
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: a
-    real(wp), intent(in) :: dt, ahead                 !! [s]
-    type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
-    real(wp) :: n(3), f(3), gap, sides, opening
-    integer :: w
-
-    do w = 1, walls%n
-      n = walls%normal(:, w)
-      gap = walls%offset(w) - dot_product(n, blocks%x(:, a)) - lubrication%radius(a)
-      sides = merge(2.0_wp, 1.0_wp, walls%slip(w))
-      opening = -sides*dot_product(n, blocks%v(:, a))
-      f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap + ahead*opening, opening, &
-               sides*inverse_mass(blocks, a), dt)*n
-      force(:, a) = force(:, a) - f
-      force(:, walls%number(w)) = force(:, walls%number(w)) + f
-    end do
-  end subroutine films_at_walls
 
   !> Force of the film between spheres a and b on b, its opposite acts on a [N].
   pure function film_of_pair(period, blocks, a, b, dt, ahead, lubrication) result(f)

@@ -215,10 +215,15 @@ contains
     integer, intent(inout) :: n
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
+    real(wp) :: d(3)
 
     call ensure_capacity(n + size(edges), list)
     do k = 1, size(edges)
-      if (.not. edge_is_near(host%edge(edges(k)), place, cutoff)) cycle
+      associate (edge => host%edge(edges(k)))
+        d = place - edge%start
+        d = d - min(max(dot_product(d, edge%along), 0.0_wp), edge%extent)*edge%along
+      end associate
+      if (.not. dot_product(d, d) <= cutoff**2) cycle
       n = n + 1
       list(n) = edges(k)
     end do
@@ -240,18 +245,6 @@ contains
     end do
   end function facet_is_near
 
-  !> Whether an edge is within the cutoff of a place.
-  pure function edge_is_near(edge, place, cutoff) result(yes)
-    type(edge_t), intent(in) :: edge
-    real(wp), intent(in) :: place(3), cutoff   !! body axes [m]
-    logical :: yes
-    real(wp) :: d(3)
-
-    d = place - edge%start
-    d = d - min(max(dot_product(d, edge%along), 0.0_wp), edge%extent)*edge%along
-    yes = dot_product(d, d) <= cutoff**2
-  end function edge_is_near
-
   !> Pairs of convex edges that may cross before the bodies have moved by the skin.
   subroutine list_crossings(a_in_b, surface_a, surface_b, search, near)
     type(view_t), intent(in) :: a_in_b
@@ -260,7 +253,7 @@ contains
     type(near_features_t), intent(inout) :: near
     type(edge_t) :: guest
     real(wp) :: cutoff, away, low(3), high(3)
-    integer :: m, k, i, j
+    integer :: m, k, i, j, n
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
     cutoff = near%valid + search%ahead + min(surface_a%length, surface_b%length)
@@ -280,27 +273,20 @@ contains
         if (j > surface_b%n_convex) exit
         away = way_to_crossing(guest, surface_b%edge(j), near%valid, cutoff, &
           min(surface_a%bounding_radius, surface_b%bounding_radius))
-        if (away < nowhere) call add_crossing(i, j, away, near)
+        ! Append a pair of edges that may cross.
+        if (away < nowhere) then
+          n = near%n_crossings + 1
+          near%n_crossings = n
+          call ensure_capacity(n, near%edge_a)
+          call ensure_capacity(n, near%edge_b)
+          call ensure_capacity(n, near%away)
+          near%edge_a(n) = i
+          near%edge_b(n) = j
+          near%away(n) = away
+        end if
       end do
     end do
   end subroutine list_crossings
-
-  !> Append a pair of edges that may cross.
-  subroutine add_crossing(i, j, away, near)
-    integer, intent(in) :: i, j            !! edges of a and of b
-    real(wp), intent(in) :: away           !! [m]
-    type(near_features_t), intent(inout) :: near
-    integer :: n
-
-    n = near%n_crossings + 1
-    near%n_crossings = n
-    call ensure_capacity(n, near%edge_a)
-    call ensure_capacity(n, near%edge_b)
-    call ensure_capacity(n, near%away)
-    near%edge_a(n) = i
-    near%edge_b(n) = j
-    near%away(n) = away
-  end subroutine add_crossing
 
   !> An edge seen from the other body.
   pure function edge_in_view(view, edge) result(seen)

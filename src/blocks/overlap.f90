@@ -86,9 +86,26 @@ contains
     integer, intent(in) :: c
     type(overlap_t), intent(in) :: overlap
     logical :: free
+    real(wp) :: depth, turn(3, 3), d(3)
+    type(found_t) :: found
+    integer :: b
 
-    free = body_overlap(overlap, walls, blocks, c) &
-      <= release_overlap*blocks%shapes(blocks%shape(c))%smallest_edge
+    ! Largest depth in the other present bodies, the walls and the bed [m].
+    depth = 0.0_wp
+    turn = rotation_matrix(blocks%q(:, c))
+    associate (own => overlap%solid(blocks%shape(c)))
+      call deepen_wall(own%corner, own%ball, own%radius, blocks%x(:, c), turn, walls, depth)
+      if (walls%bed%there) call deepen_bed(own, blocks%x(:, c), turn, walls%bed, found, depth)
+      do b = 1, blocks%n
+        if (b == c .or. .not. blocks%present(b)) cycle
+        d = blocks%x(:, c) - blocks%x(:, b)
+        d = d - nearest_shift(walls%period, -d)
+        if (norm(d) >= own%radius + overlap%solid(blocks%shape(b))%radius) cycle
+        call deepen_pair(own, turn, overlap%solid(blocks%shape(b)), &
+          rotation_matrix(blocks%q(:, b)), d, depth)
+      end do
+    end associate
+    free = depth <= release_overlap*blocks%shapes(blocks%shape(c))%smallest_edge
   end function has_place
 
   !> Whether the places of two bodies exclude one another: they reach deeper into one another than a
@@ -114,33 +131,6 @@ contains
     end associate
     yes = depth > allowed
   end function exclude
-
-  !> Largest depth of body c in the other present bodies, the walls and the bed [m].
-  function body_overlap(overlap, walls, blocks, c) result(depth)
-    type(overlap_t), intent(in) :: overlap
-    type(walls_t), intent(in) :: walls
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: c
-    real(wp) :: depth
-    type(found_t) :: found
-    real(wp) :: turn(3, 3), d(3)
-    integer :: b
-
-    depth = 0.0_wp
-    turn = rotation_matrix(blocks%q(:, c))
-    associate (own => overlap%solid(blocks%shape(c)))
-      call deepen_wall(own%corner, own%ball, own%radius, blocks%x(:, c), turn, walls, depth)
-      if (walls%bed%there) call deepen_bed(own, blocks%x(:, c), turn, walls%bed, found, depth)
-      do b = 1, blocks%n
-        if (b == c .or. .not. blocks%present(b)) cycle
-        d = blocks%x(:, c) - blocks%x(:, b)
-        d = d - nearest_shift(walls%period, -d)
-        if (norm(d) >= own%radius + overlap%solid(blocks%shape(b))%radius) cycle
-        call deepen_pair(own, turn, overlap%solid(blocks%shape(b)), &
-          rotation_matrix(blocks%q(:, b)), d, depth)
-      end do
-    end associate
-  end function body_overlap
 
   !> Largest depth of the bodies that are asked for in one another, in the walls and in the bed [m],
   !! and those that reach deep for their size.

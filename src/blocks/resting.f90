@@ -116,7 +116,23 @@ contains
         contacts%loads%torque(:, 1:))
     else
       call match_displacements(contacts%detected, contacts%before, contacts%displacements)
-      call foresee_motion(gravity, dt_b, blocks, contacts)
+      ! Velocities of the counterparts in the middle of a substep, if the candidates begin it at
+      ! rest.
+      associate (acting => contacts%detected%acting)
+        call update_motion(blocks, acting%body(:acting%n), contacts%detected%counterparts)
+      end associate
+      do b = 1, blocks%n
+        if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+        associate (v => contacts%detected%counterparts%v(:, b), &
+                   omega => contacts%detected%counterparts%omega(:, b))
+          if (contacts%sleep%candidate(b)) v = 0.0_wp
+          if (contacts%sleep%candidate(b)) omega = 0.0_wp
+          v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
+          omega = omega + 0.5_wp*dt_b &
+            *matmul(contacts%detected%counterparts%inverse_inertia(:, :, b), &
+                    blocks%fluid_torque(:, b))
+        end associate
+      end do
       call sum_forces(dt_b, contacts%detected, contacts%displacements, contacts%loads, ignored)
     end if
     call update_supported(blocks, contacts)
@@ -136,30 +152,6 @@ contains
     end associate
     if (changed) call freeze_contacts(dt_b, blocks, contacts)
   end subroutine let_sleep
-
-  !> Velocities of the counterparts in the middle of a substep, if the candidates begin it at rest.
-  subroutine foresee_motion(gravity, dt_b, blocks, contacts)
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in) :: dt_b         !! the substep [s]
-    type(blocks_t), intent(in) :: blocks
-    type(contacts_t), intent(inout) :: contacts
-    integer :: b
-
-    associate (acting => contacts%detected%acting)
-      call update_motion(blocks, acting%body(:acting%n), contacts%detected%counterparts)
-    end associate
-    do b = 1, blocks%n
-      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      associate (v => contacts%detected%counterparts%v(:, b), &
-        omega => contacts%detected%counterparts%omega(:, b))
-        if (contacts%sleep%candidate(b)) v = 0.0_wp
-        if (contacts%sleep%candidate(b)) omega = 0.0_wp
-        v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
-        omega = omega + 0.5_wp*dt_b*matmul( &
-          contacts%detected%counterparts%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
-      end associate
-    end do
-  end subroutine foresee_motion
 
   !> Which blocks are held up: they touch a wall, the bed, a body that is fixed or asleep, or others
   !! that are held up. Those are no candidates that touch what is moved at a given rate.

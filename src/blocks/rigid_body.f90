@@ -92,14 +92,35 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(blocks_t), intent(out) :: blocks
-    integer :: b, i, k
+    integer :: b, i, k, n
 
     blocks%n = size(case%body)
     do i = 1, size(case%drop)
       blocks%n = blocks%n + case%drop(i)%count
     end do
     blocks%shapes = shapes
-    call allocate_state(blocks)
+    ! Allocate all arrays over bodies, at rest and without forces.
+    n = blocks%n
+    allocate (blocks%inverse_inertia(3, 3, n), source=0.0_wp)
+    allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
+    allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
+      source=.false.)
+    allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
+      blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
+    allocate (blocks%exit_time(n), source=-1.0_wp)
+    allocate (blocks%name(n), blocks%handling(n))
+    allocate (blocks%planned(2, n), source=0.0_wp)
+    allocate (blocks%on_ground(n), source=.false.)
+    allocate (blocks%status(n), source=to_come)
+    allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
+      source=0.0_wp)
+    allocate (blocks%path(n), blocks%ahead(2, n))
+    blocks%ahead = 0.0_wp
+    allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
+    allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
+    allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
+    allocate (blocks%lagged_force(6, n), source=0.0_wp)
+    allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
     do b = 1, size(case%body)
       call put_block(case, place_of_body(case%body(b)), b, blocks)
       blocks%given%omega(:, b) = case%body(b)%angular_velocity
@@ -212,34 +233,6 @@ contains
       if (blocks%present(b)) call release_body(blocks%release_time(b), b, blocks)
     end do
   end subroutine turn_with_fluid
-
-  !> Allocate all arrays over bodies, at rest and without forces.
-  subroutine allocate_state(blocks)
-    type(blocks_t), intent(inout) :: blocks
-    integer :: n
-
-    n = blocks%n
-    allocate (blocks%inverse_inertia(3, 3, n), source=0.0_wp)
-    allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
-    allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
-      source=.false.)
-    allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
-      blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
-    allocate (blocks%exit_time(n), source=-1.0_wp)
-    allocate (blocks%name(n), blocks%handling(n))
-    allocate (blocks%planned(2, n), source=0.0_wp)
-    allocate (blocks%on_ground(n), source=.false.)
-    allocate (blocks%status(n), source=to_come)
-    allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
-      source=0.0_wp)
-    allocate (blocks%path(n), blocks%ahead(2, n))
-    blocks%ahead = 0.0_wp
-    allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
-    allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
-    allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
-    allocate (blocks%lagged_force(6, n), source=0.0_wp)
-    allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
-  end subroutine allocate_state
 
   !> Release body b with its given velocity. One that a crane lowers is held first: it comes in, and
   !! is let go by a second call.
@@ -377,7 +370,16 @@ contains
     real(wp) :: omega(3), half_way(4)
 
     if (blocks%fixed(b)) then
-      call drift_prescribed(dt, b, blocks)
+      ! Move a fixed body for a time dt at its constant given rate, or to `blocks%time` on its path.
+      if (blocks%path(b)%n > 0) then
+        call follow(b, blocks)
+        return
+      end if
+      blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
+      if (all(abs(blocks%omega(:, b)) <= 0.0_wp)) return
+      blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), &
+                                                     blocks%q(:, b)))
+      call set_momentum(b, blocks)
       return
     end if
     associate (inverse => blocks%inverse_inertia(:, :, b), l => blocks%l(:, b), &
@@ -405,23 +407,6 @@ contains
     blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
       blocks%inverse_inertia(:, :, b))
   end subroutine place_body
-
-  !> Move a fixed body for a time dt at its constant given rate, or to `blocks%time` on its path.
-  pure subroutine drift_prescribed(dt, b, blocks)
-    real(wp), intent(in) :: dt   !! [s]
-    integer, intent(in) :: b
-    type(blocks_t), intent(inout) :: blocks
-
-    if (blocks%path(b)%n > 0) then
-      call follow(b, blocks)
-      return
-    end if
-    blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
-    if (all(abs(blocks%omega(:, b)) <= 0.0_wp)) return
-    blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), &
-      blocks%q(:, b)))
-    call set_momentum(b, blocks)
-  end subroutine drift_prescribed
 
   !> Angular velocity of the free present bodies at their attitudes, by their angular momentum.
   pure subroutine turn_to_attitude(blocks)

@@ -56,7 +56,9 @@ contains
     type(near_features_t), intent(in) :: near
     type(short_list_t), intent(inout) :: short
     real(wp), parameter :: share = 0.02_wp    !! of a skin: least way for which the short list holds
-    integer :: n
+    integer :: n, m, last
+    type(edge_t) :: guest
+    real(wp) :: margin
 
     short%when = now%poses
     short%left = near%valid - way
@@ -69,7 +71,22 @@ contains
     call choose_vertices(now%a_in_b, way, surface_a, surface_b, near%of_a, short, n)
     short%n_of_a = n
     short%edges = short%n + 1
-    call choose_edges(now%a_in_b, way, surface_a, surface_b, near, short)
+    ! Append those pairs of edges that may cross while the short list holds.
+    short%n_edges = 0
+    margin = short%until
+    last = 0
+    do m = 1, near%n_crossings
+      if (near%away(m) > way + margin) cycle
+      if (near%edge_a(m) /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(near%edge_a(m)))
+      last = near%edge_a(m)
+      if (way_to_crossing(guest, surface_b%edge(near%edge_b(m)), margin, &
+        margin + min(surface_a%length, surface_b%length), &
+        min(surface_a%bounding_radius, surface_b%bounding_radius)) > margin) cycle
+      call ensure_capacity(short%n + 2, short%item)
+      short%item(short%n + 1:short%n + 2) = [near%edge_a(m), near%edge_b(m)]
+      short%n = short%n + 2
+      short%n_edges = short%n_edges + 1
+    end do
     call ensure_capacity(short%n + 1, short%item)
     ! without any feature in the lists nothing comes near as long as these hold
     if (near%of_a%n + near%of_b%n + near%n_crossings == 0) short%until = huge(1.0_wp)
@@ -109,33 +126,5 @@ contains
       end associate
     end do
   end subroutine choose_vertices
-
-  !> Append those pairs of edges that may cross while the short list holds.
-  subroutine choose_edges(a_in_b, way, surface_a, surface_b, near, short)
-    type(view_t), intent(in) :: a_in_b
-    real(wp), intent(in) :: way                !! since the lists were made [m]
-    type(surface_t), intent(in) :: surface_a, surface_b
-    type(near_features_t), intent(in) :: near
-    type(short_list_t), intent(inout) :: short
-    type(edge_t) :: guest
-    real(wp) :: margin
-    integer :: m, last
-
-    short%n_edges = 0
-    margin = short%until
-    last = 0
-    do m = 1, near%n_crossings
-      if (near%away(m) > way + margin) cycle
-      if (near%edge_a(m) /= last) guest = edge_in_view(a_in_b, surface_a%edge(near%edge_a(m)))
-      last = near%edge_a(m)
-      if (way_to_crossing(guest, surface_b%edge(near%edge_b(m)), margin, &
-        margin + min(surface_a%length, surface_b%length), &
-        min(surface_a%bounding_radius, surface_b%bounding_radius)) > margin) cycle
-      call ensure_capacity(short%n + 2, short%item)
-      short%item(short%n + 1:short%n + 2) = [near%edge_a(m), near%edge_b(m)]
-      short%n = short%n + 2
-      short%n_edges = short%n_edges + 1
-    end do
-  end subroutine choose_edges
 
 end module short_list_m

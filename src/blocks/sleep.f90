@@ -20,7 +20,7 @@ module sleep_m
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
   public :: store_quiet, may_sleep
-  public :: balanced, rest_tolerance, wake_tolerance, put_to_sleep, wake, stop_sleepers, all_still
+  public :: balanced, rest_tolerance, wake_tolerance, put_to_sleep, wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp            !! speed of a candidate over sqrt(g radius)
   real(wp), parameter :: time_to_sleep = 1.0_wp      !! before it sleeps, over sqrt(radius/g)
@@ -181,17 +181,6 @@ contains
     blocks%l(:, b) = 0.0_wp
     blocks%omega(:, b) = 0.0_wp
   end subroutine put_to_sleep
-
-  !> Take from sleepers the velocity of the middle of a substep, at the end of which they have none.
-  pure subroutine stop_sleepers(bodies, blocks)
-    integer, intent(in) :: bodies(:)
-    type(blocks_t), intent(inout) :: blocks
-    integer :: k
-
-    do k = 1, size(bodies)
-      if (blocks%asleep(bodies(k))) call put_to_sleep(bodies(k), blocks)
-    end do
-  end subroutine stop_sleepers
 
   !> Wake body b. If it hardly moves then, it may sleep again once it is in balance: under waves a
   !! pile wakes for a step, leans into its supports, and sleeps on.
