@@ -27,7 +27,7 @@ contains
     if (case%run%physics /= 'coupled') return
     if (case%grid%extent_faulty .or. case%grid%cells_faulty) return
     edge = maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
-    width = huge(width)
+    width = sqrt(huge(width))   ! of a faulty shape: wide enough, without an overflow below
     do s = 1, size(shapes)
       if (shapes(s)%volume > 0.0_wp) width(s) = width_of(shapes(s))
     end do
