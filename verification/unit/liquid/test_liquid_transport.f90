@@ -26,6 +26,10 @@ module test_liquid_transport_m
   logical, parameter :: walls(3) = .false.                      !! no direction is periodic
   real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]
   real(wp), parameter :: half(3) = [0.033_wp, 0.027_wp, 0.0318_wp]   !! of the moving box [m]
+  type(grid_t) :: grid
+  type(solid_geometry_t) :: old, new
+  type(flow_t) :: flow
+  type(liquid_transport_t) :: transport
 
 contains
 
@@ -44,16 +48,12 @@ contains
   end subroutine test_liquid_transport
 
   !> Grid, flow and transport of a tank; liquid below the level and in boxes.
-  subroutine start(n, length, periodic, low, high, fluid, water, grid, old, new, flow, transport)
+  subroutine start(n, length, periodic, low, high, fluid, water)
     integer, intent(in) :: n(3)
     real(wp), intent(in) :: length(3), low(:, :), high(:, :)
     logical, intent(in) :: periodic(3)
     type(fluid_t), intent(in) :: fluid
     type(water_t), intent(in) :: water(:)
-    type(grid_t), intent(out) :: grid
-    type(solid_geometry_t), intent(out) :: old, new
-    type(flow_t), intent(out) :: flow
-    type(liquid_transport_t), intent(out) :: transport
 
     call simple_grid(n, length, grid, periodic)
     call flow_init(grid, flow)
@@ -67,8 +67,7 @@ contains
   end subroutine start
 
   !> Liquid that is in one field but not in the other [m3].
-  function misplaced(grid, liquid, other) result(volume)
-    type(grid_t), intent(in) :: grid
+  function misplaced(liquid, other) result(volume)
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: liquid, other
     real(wp) :: volume
 
@@ -79,9 +78,7 @@ contains
   end function misplaced
 
   !> Largest violation of 0 <= W <= Vt [V].
-  function out_of_bounds(grid, flow) result(worst)
-    type(grid_t), intent(in) :: grid
-    type(flow_t), intent(in) :: flow
+  function out_of_bounds() result(worst)
     real(wp) :: worst
 
     associate (a => grid%lo, b => grid%hi)
@@ -107,20 +104,16 @@ contains
   !> A ball of liquid goes once around a periodic domain, cells not cubes.
   subroutine ball_in_uniform_stream(steps, subcycles)
     integer, intent(in) :: steps, subcycles   !! of the turn, of each step
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: nothing(3, 0), before, worst, shape_error
     real(wp), allocatable :: start_liquid(:, :, :)
     integer :: step, i, j, k
 
     call start([24, 16, 20], spread(0.24_wp, 1, 3), .not. walls, nothing, nothing, fluid_t(), &
-               [water_t ::], grid, old, new, flow, transport)
+               [water_t ::])
     do k = 1, grid%n(3)
       do j = 1, grid%n(2)
         do i = 1, grid%n(1)
-          flow%liquid(i, j, k) = grid%volume*ball_share(grid, [i, j, k])
+          flow%liquid(i, j, k) = grid%volume*ball_share([i, j, k])
         end do
       end do
     end do
@@ -134,9 +127,9 @@ contains
     transport%subcycles = subcycles
     do step = 1, steps
       call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow)
-      worst = max(worst, out_of_bounds(grid, flow))
+      worst = max(worst, out_of_bounds())
     end do
-    shape_error = misplaced(grid, flow%liquid, start_liquid)/before
+    shape_error = misplaced(flow%liquid, start_liquid)/before
     call check('ball: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, 1.0e-14_wp)
     call check('ball: bounds', worst, 0.0_wp, 1.0e-15_wp)
     call check('ball: room', room_error(grid, new, flow), 0.0_wp, 1.0e-13_wp)
@@ -146,8 +139,7 @@ contains
   end subroutine ball_in_uniform_stream
 
   !> Share of a ball of radius 0.06 m in the middle, by points.
-  pure function ball_share(grid, at) result(share)
-    type(grid_t), intent(in) :: grid
+  function ball_share(at) result(share)
     integer, intent(in) :: at(3)
     real(wp) :: share
     integer, parameter :: n = 8
@@ -169,10 +161,6 @@ contains
 
   !> A block of liquid in solid rotation about the y axis.
   subroutine column_in_rotation()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: nothing(3, 0), before, worst, shape_error
     real(wp), allocatable :: start_liquid(:, :, :)
     real(wp) :: x(2)
@@ -181,8 +169,7 @@ contains
 
     call start([32, 4, 32], [0.32_wp, 0.04_wp, 0.32_wp], [.false., .true., .false.], nothing, &
                nothing, &
-               fluid_t(), [water_t([0.13_wp, 0.0_wp, 0.05_wp], [0.19_wp, 0.04_wp, 0.21_wp])], &
-               grid, old, new, flow, transport)
+               fluid_t(), [water_t([0.13_wp, 0.0_wp, 0.05_wp], [0.19_wp, 0.04_wp, 0.21_wp])])
     allocate (start_liquid, source=flow%liquid)
     before = liquid_volume(grid, flow%liquid)
     do k = grid%lo(3), grid%hi(3) + 1
@@ -195,9 +182,9 @@ contains
     worst = 0.0_wp
     do step = 1, steps
       call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow)
-      worst = max(worst, out_of_bounds(grid, flow))
+      worst = max(worst, out_of_bounds())
     end do
-    shape_error = misplaced(grid, flow%liquid, start_liquid)/before
+    shape_error = misplaced(flow%liquid, start_liquid)/before
     call check('rotation: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, 1.0e-14_wp)
     call check('rotation: bounds', worst, 0.0_wp, 1.0e-15_wp)
     call check('rotation: shape after one turn', shape_error < 0.05_wp)
@@ -225,18 +212,13 @@ contains
   !! time.
   subroutine box_under_water(subcycles)
     integer, intent(in) :: subcycles   !! of each step
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 1), high(3, 1), before, worst, impure, angle
     type(fluid_t) :: fluid
     integer :: step, small
 
     fluid%water_level = 0.19_wp
     call box_at(place(0.0_wp), half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
-               transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::])
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     impure = 0.0_wp
@@ -274,10 +256,6 @@ contains
 
   !> A box dips into the water and comes out again.
   subroutine box_through_the_surface()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 1), high(3, 1), before, worst, bound, drift, clamped, centre(3)
     type(fluid_t) :: fluid
     integer :: step, late
@@ -285,8 +263,7 @@ contains
     fluid%water_level = 0.1013_wp
     centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
     call box_at(centre, half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
-               transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::])
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     bound = 0.0_wp
@@ -301,7 +278,7 @@ contains
       call set_boxes(grid, low, high, new)
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       worst = max(worst, room_error(grid, new, flow))
-      bound = max(bound, out_of_bounds(grid, flow))
+      bound = max(bound, out_of_bounds())
       drift = max(drift, abs(liquid_volume(grid, flow%liquid) - flow%liquid_inflow - before)/before)
       clamped = max(clamped, transport%sweeps%clamped)
       late = max(late, transport%small%iterations)
@@ -317,10 +294,7 @@ contains
 
   !> A turning hexapod dips into the water and comes out again, fluid moved by the correction alone.
   subroutine hexapod_through_the_surface()
-    type(grid_t) :: grid
     type(solid_geometry_t), allocatable :: old, new, keep
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     type(case_t) :: case
     type(shape_t) :: shapes(1)
     type(blocks_t) :: blocks
@@ -360,7 +334,7 @@ contains
       call update_solid(fraction, grid, blocks, new)
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       worst = max(worst, room_error(grid, new, flow))
-      bound = max(bound, out_of_bounds(grid, flow))
+      bound = max(bound, out_of_bounds())
       volume = liquid_volume(grid, flow%liquid) - flow%liquid_inflow
       drift = max(drift, abs(volume/flow%liquid_initial - 1.0_wp))
     end do
@@ -373,10 +347,6 @@ contains
 
   !> A box moves out through the open top: what it leaves behind comes in as gas.
   subroutine box_leaves_through_the_top()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 1), high(3, 1), before, worst, centre(3)
     type(fluid_t) :: fluid
     integer :: step
@@ -384,8 +354,7 @@ contains
     fluid%water_level = 0.0613_wp
     centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
     call box_at(centre, half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
-               transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::])
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     do step = 1, 30
@@ -404,18 +373,13 @@ contains
   !> A box swells in a closed tank: the volume has nowhere to go, yet no liquid is lost, all bounds
   !! hold and the cells that close give all they had.
   subroutine no_way_out()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 1), high(3, 1), before, bound, held
     type(fluid_t) :: fluid
     integer :: step
 
     fluid%water_level = 0.1013_wp
     call box_at(place(0.0_wp), half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
-               transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::])
     grid%side(2, 3) = side_slip
     before = liquid_volume(grid, flow%liquid)
     bound = 0.0_wp
@@ -425,7 +389,7 @@ contains
       call box_at(place(0.0_wp), half + 0.002_wp*real(step, wp), low, high)
       call set_boxes(grid, low, high, new)
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
-      bound = max(bound, out_of_bounds(grid, flow))
+      bound = max(bound, out_of_bounds())
       associate (n => grid%n)
         held = max(held, sum(flow%liquid(1:n(1), 1:n(2), 1:n(3)), &
                              new%alpha(1:n(1), 1:n(2), 1:n(3)) >= 1.0_wp - 1.0e-12_wp)/grid%volume)
@@ -439,10 +403,6 @@ contains
 
   !> Level inside a cell, boxes through the surface: nothing moves, each row has one C^.
   subroutine still_water()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 3), high(3, 3), spread_of_row
     real(wp), allocatable :: liquid(:, :, :), c(:, :, :)
     type(fluid_t) :: fluid
@@ -455,8 +415,7 @@ contains
     high(:, 2) = [0.111_wp, 0.033_wp, 0.2_wp]
     low(:, 3) = [0.12_wp, 0.05_wp, 0.1502_wp]
     high(:, 3) = [0.151_wp, 0.1_wp, 0.153_wp]
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
-               transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::])
     allocate (liquid, source=flow%liquid)
     allocate (c, source=flow%c)
     do step = 1, 3
@@ -480,10 +439,6 @@ contains
 
   !> A wall parts the tank, the levels differ; a box dips into one basin. Each keeps its liquid.
   subroutine two_basins()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: old, new
-    type(flow_t) :: flow
-    type(liquid_transport_t) :: transport
     real(wp) :: low(3, 2), high(3, 2), left, right, worst, bound
     type(fluid_t) :: fluid
     integer :: step
@@ -494,8 +449,7 @@ contains
     low(:, 2) = [0.0213_wp, 0.0281_wp, 0.1111_wp]
     high(:, 2) = [0.0671_wp, 0.0837_wp, 0.1577_wp]
     call start(tank_cells, tank, walls, low, high, fluid, &
-               [water_t([0.0_wp, 0.0_wp, 0.0_wp], [0.09_wp, 0.12_wp, 0.1_wp])], &
-               grid, old, new, flow, transport)
+               [water_t([0.0_wp, 0.0_wp, 0.0_wp], [0.09_wp, 0.12_wp, 0.1_wp])])
     left = sum(flow%liquid(1:9, 1:12, 1:20))
     right = sum(flow%liquid(10:16, 1:12, 1:20))
     worst = 0.0_wp
@@ -508,7 +462,7 @@ contains
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       worst = max(worst, abs(sum(flow%liquid(1:9, 1:12, 1:20))/left - 1.0_wp), &
                   abs(sum(flow%liquid(10:16, 1:12, 1:20))/right - 1.0_wp))
-      bound = max(bound, out_of_bounds(grid, flow))
+      bound = max(bound, out_of_bounds())
     end do
     call check('two basins: each keeps its liquid', worst, 0.0_wp, 1.0e-13_wp)
     call check('two basins: bounds, to the tolerance of the volumes', bound, 0.0_wp, 1.0e-12_wp)
