@@ -2,6 +2,7 @@
 module faults_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
+  use vectors_m, only: norm, norms
   use errors_m, only: exit_ok, exit_numerics, to_text, brief
   use grid_m, only: grid_t
   use boundary_kinds_m, only: is_wall
@@ -36,7 +37,7 @@ contains
     type(fault_t), intent(inout) :: fault
 
     fault%place = sim%blocks%x(:, :sim%blocks%n)
-    fault%speed = norm2(sim%blocks%v(:, :sim%blocks%n), 1)
+    fault%speed = norms(sim%blocks%v(:, :sim%blocks%n))
     fault%there = sim%blocks%present
   end subroutine store_places
 
@@ -80,9 +81,9 @@ contains
 
     do b = 1, sim%blocks%n
       if (.not. fault%there(b)) cycle
-      associate (dt => sim%clock%dt, v => norm2(sim%blocks%v(:, b)))
-        moved = norm2(sim%blocks%x(:, b) - fault%place(:, b))
-        explained = dt*(fault%speed(b) + v + dt*norm2(sim%case%fluid%gravity)) &
+      associate (dt => sim%clock%dt, v => norm(sim%blocks%v(:, b)))
+        moved = norm(sim%blocks%x(:, b) - fault%place(:, b))
+        explained = dt*(fault%speed(b) + v + dt*norm(sim%case%fluid%gravity)) &
           + sim%grid%min_spacing()
         if (moved > explained) call set(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
           //' m in a step of '//brief(dt)//' s, though its speed is '//brief(v) &

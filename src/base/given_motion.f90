@@ -13,7 +13,7 @@
 !! ends at rest.
 module given_motion_m
   use kinds_m, only: wp
-  use vectors_m, only: quaternion_exp, quaternion_log, quaternion_product, normalised, &
+  use vectors_m, only: norms, quaternion_exp, quaternion_log, quaternion_product, normalised, &
     rotation_matrix
   implicit none
   private
@@ -67,7 +67,7 @@ contains
           inverse(quaternion_product(quaternion_exp(step(4:6, 1)), motion%q(:, i))))
         step(4:6, 2) = quaternion_log(quaternion_product(quaternion_exp(-step(4:6, 3)), middle))
         do k = 1, 2
-          motion%fastest(k, i) = bound(norm2(step(3*k - 2:3*k, :), 1)*3.0_wp/h)
+          motion%fastest(k, i) = bound(norms(step(3*k - 2:3*k, :))*3.0_wp/h)
         end do
       end associate
     end do

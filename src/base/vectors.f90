@@ -3,7 +3,7 @@ module vectors_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: cross, wrench, norm, distance, normalised
+  public :: cross, wrench, norm, norms, distance, normalised, cube_root
   public :: quaternion_product, quaternion_from_axis, quaternion_exp, quaternion_log
   public :: rotation_matrix, inverse3
 
@@ -28,13 +28,32 @@ contains
     w(4:6) = cross(arm, f)
   end function wrench
 
-  !> Euclidean length of a vector of any length.
+  !> Euclidean length of a vector of any length. It has the same digits in other units, powers of
+  !! two apart; `norm2` of gfortran has not, it rounds otherwise where a component passes 1.
   pure function norm(a) result(length)
     real(wp), intent(in) :: a(:)
     real(wp) :: length
 
     length = sqrt(dot_product(a, a))
   end function norm
+
+  !> The lengths of the columns.
+  pure function norms(a) result(length)
+    real(wp), intent(in) :: a(:, :)
+    real(wp) :: length(size(a, 2))
+
+    length = sqrt(sum(a**2, 1))
+  end function norms
+
+  !> Third root, of the same digits in other units, which `x**(1/3)` has not.
+  elemental function cube_root(x) result(root)
+    real(wp), intent(in) :: x   !! >= 0
+    real(wp) :: root
+    integer :: thirds
+
+    thirds = (exponent(x) - modulo(exponent(x), 3))/3
+    root = scale(scale(x, -3*thirds)**(1.0_wp/3.0_wp), thirds)
+  end function cube_root
 
   !> Distance of two points.
   pure function distance(a, b) result(length)

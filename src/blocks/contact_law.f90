@@ -5,6 +5,7 @@
 !! (`law_constants_m`) takes those given. `contact_laws_m` knows them by their names.
 module contact_law_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   implicit none
   private
   public :: contact_law_t, stiffness_t, load_t
@@ -147,7 +148,7 @@ contains
 
     f = eta*v_t
     if (abs(gamma - 1.0_wp) > 0.0_wp) then
-      if (any(abs(xi) > 0.0_wp)) f = f + k*norm2(xi)**(gamma - 1.0_wp)*xi
+      if (any(abs(xi) > 0.0_wp)) f = f + k*norm(xi)**(gamma - 1.0_wp)*xi
     else
       f = f + k*xi
     end if
@@ -164,7 +165,7 @@ contains
     xi = 0.0_wp
     if (k <= 0.0_wp) return
     stretch = (f - eta*v_t)/k
-    length = norm2(stretch)
+    length = norm(stretch)
     if (length > 0.0_wp) xi = stretch*length**(1.0_wp/gamma - 1.0_wp)
   end function tangential_slip
 

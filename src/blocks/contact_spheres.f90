@@ -6,7 +6,7 @@
 module contact_spheres_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
-  use vectors_m, only: rotation_matrix
+  use vectors_m, only: norm, norms, rotation_matrix
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
@@ -73,7 +73,7 @@ contains
     do s = 1, size(blocks%shapes)
       associate (shape => blocks%shapes(s))
         self%set(s)%largest = maxval(shape%sphere_radius)
-        self%set(s)%bounding_radius = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
+        self%set(s)%bounding_radius = maxval(norms(shape%sphere_centre) + shape%sphere_radius)
         call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, &
           self%set(s)%bins)
       end associate
@@ -145,12 +145,12 @@ contains
     a = self%list%a(p)
     b = self%list%b(p)
     v = blocks%v(:, a)
-    way = norm2(blocks%omega(:, a))*self%bounding_radius(a)
+    way = norm(blocks%omega(:, a))*self%bounding_radius(a)
     if (b > 0) then
       v = v - blocks%v(:, b)
-      way = way + norm2(blocks%omega(:, b))*self%bounding_radius(b)
+      way = way + norm(blocks%omega(:, b))*self%bounding_radius(b)
     end if
-    way = time*(way + norm2(v))
+    way = time*(way + norm(v))
   end function way
 
   !> Whether the list of candidates has to be made anew.
@@ -169,7 +169,7 @@ contains
       dx = blocks%x(:, b) - self%x(:, b)
       dq = blocks%q(:, b) - self%q(:, b)
       ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-      if (norm2(dx) + 2*self%bounding_radius(b)*norm2(dq) > self%free_way) return
+      if (norm(dx) + 2*self%bounding_radius(b)*norm(dq) > self%free_way) return
     end do
     yes = .false.
   end function moved_too_far

@@ -6,7 +6,7 @@
 !! result is a minimum, which no order of the work can change.
 module ground_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, rotation_matrix
+  use vectors_m, only: norm, cross, rotation_matrix
   use tet_mesh_m, only: extent_along
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t, floor_wall
@@ -101,7 +101,7 @@ contains
         d = x - blocks%x(:, b)
         d = d - nearest_shift(walls%period, -d)
         associate (other => overlap%solid(blocks%shape(b)))
-          if (norm2(d(1:2)) >= own%radius + other%radius) cycle
+          if (norm(d(1:2)) >= own%radius + other%radius) cycle
           if (d(3) - own%radius - other%radius >= gap) cycle
           call lower_on_block(own, d, other, rotation_matrix(blocks%q(:, b)), least, gap)
         end associate
@@ -154,7 +154,7 @@ contains
     real(wp) :: n(3)
 
     n = cross(face(:, 2) - face(:, 1), face(:, 3) - face(:, 1))
-    n_z = n(3)/max(norm2(n), tiny(n_z))
+    n_z = n(3)/max(norm(n), tiny(n_z))
   end function slope
 
   !> Lower the block over another one.
@@ -319,7 +319,7 @@ contains
     integer :: i
 
     n = cross(face(:, 2) - face(:, 1), face(:, 3) - face(:, 1))
-    n = sign(1.0_wp, n(3))*n/norm2(n)
+    n = sign(1.0_wp, n(3))*n/norm(n)
     foot = centre - radius*n
     if (is_over(foot, face)) call lower_to(foot(3) - height_of(foot, face), least, gap)
     do i = 1, 3
@@ -327,7 +327,7 @@ contains
       if (sum(d**2) < radius**2) call lower_to(centre(3) - face(3, i) &
         - sqrt(radius**2 - sum(d**2)), least, gap)
       e = face(:, 1 + mod(i, 3)) - face(:, i)
-      length = norm2(e)
+      length = norm(e)
       e = e/length
       ! the upper height z over the start at which the centre is as far as the radius from the line
       a = 1.0_wp - e(3)**2

@@ -403,7 +403,7 @@ contains
           memory%k(m) = 0.0_wp
           way = past(rows%way(:, point%a), rows%way(:, point%b), row)
           memory%xi(:, m) = 0.0_wp
-          if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
+          if (norm(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &
               + way - dot_product(way, row%n)*row%n
           end if

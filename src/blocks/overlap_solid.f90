@@ -2,7 +2,7 @@
 !! surface, tetrahedra and triangles in bins.
 module overlap_solid_m
   use kinds_m, only: wp, i8
-  use vectors_m, only: cross, norm, inverse3
+  use vectors_m, only: norms, cross, norm, inverse3
   use tet_mesh_m, only: shape_t, surface_of_tets
   use neighbours_m, only: bins_t, bins_build
   implicit none
@@ -214,8 +214,8 @@ contains
       solid%cluster(n) = i
       solid%middle(:, n) = 0.5_wp*(minval(solid%sample(:, i:last), 2) &
         + maxval(solid%sample(:, i:last), 2))
-      solid%bounding_radius(n) = maxval(norm2(solid%sample(:, i:last) &
-        - spread(solid%middle(:, n), 2, last - i + 1), 1))
+      solid%bounding_radius(n) = maxval(norms(solid%sample(:, i:last) &
+        - spread(solid%middle(:, n), 2, last - i + 1)))
     end do
     solid%cluster(n + 1) = size(solid%sample, 2) + 1
   end subroutine cluster_samples

@@ -570,8 +570,8 @@ contains
     integer, intent(in) :: b
     real(wp) :: speed
 
-    speed = max(norm2(blocks%v(:, b)), blocks%ahead(1, b)) &
-            + max(norm2(blocks%omega(:, b)), blocks%ahead(2, b)) &
+    speed = max(norm(blocks%v(:, b)), blocks%ahead(1, b)) &
+            + max(norm(blocks%omega(:, b)), blocks%ahead(2, b)) &
             *blocks%shapes(blocks%shape(b))%radius
   end function fastest_point
 

@@ -134,7 +134,7 @@ contains
 
     do b = 1, blocks%n
       way = distance(blocks%x(:, b), sleep%x(:, b)) &
-        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%bounding_radius(b)
+        + 2.0_wp*norm(blocks%q(:, b) - sleep%q(:, b))*sleep%bounding_radius(b)
       if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
           way <= slow*sqrt(norm(gravity)*sleep%bounding_radius(b))*dt) then
         sleep%quiet(b) = sleep%quiet(b) + dt

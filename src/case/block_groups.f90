@@ -1,7 +1,7 @@
 !> The groups of the blocks: `&contact`, `&bed`, `&shape`, `&body`, `&drop`.
 module block_groups_m
   use kinds_m, only: wp, name_length, pi
-  use vectors_m, only: quaternion_from_axis
+  use vectors_m, only: norm, quaternion_from_axis
   use errors_m, only: to_text
   use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
     bed_input_t, start_t, handling_t, absent, is_given, size_count, max_variants
@@ -439,7 +439,7 @@ contains
     end if
     if (.not. v%good('quaternion')) q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     ! of length one; what is so already, to round-off, stays, so that reading again changes nothing
-    if (abs(dot_product(q, q) - 1.0_wp) > 4.0_wp*epsilon(1.0_wp)) q = q/norm2(q)
+    if (abs(dot_product(q, q) - 1.0_wp) > 4.0_wp*epsilon(1.0_wp)) q = q/norm(q)
   end subroutine visit_attitude
 
 end module block_groups_m

@@ -5,7 +5,7 @@
 module motion_file_m
   use kinds_m, only: wp, name_length, pi
   use errors_m, only: problems_t, to_text, brief
-  use vectors_m, only: normalised
+  use vectors_m, only: norm, normalised
   use case_types_m, only: case_t, body_input_t, is_given
   use csv_table_m, only: csv_table_t, read_table
   use named_files_m, only: found_file
@@ -63,7 +63,7 @@ contains
     call given_motion_init(time, x, q, body%path)
     call pose_at(body%path, max(body%release_time, 0.0_wp), place, attitude, v, omega)
     if (is_given(body%position(1))) then
-      if (norm2(body%position - place) > same_place) then
+      if (norm(body%position - place) > same_place) then
         call problems%add_message('&body position = '//to_text(body%position) &
           //': motion = '//quoted_text(body%motion)//' has the body at '//to_text(place) &
           //' then; leave position away, or give that', body%line)
@@ -105,7 +105,7 @@ contains
       time(r) = row(1)
       x(:, r) = row(2:4)
       q(:, r) = row(5:8)
-      if (.not. norm2(q(:, r)) > 0.0_wp) then
+      if (.not. norm(q(:, r)) > 0.0_wp) then
         call table%report(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', problems)
         good(r) = .false.
         cycle

@@ -1,6 +1,7 @@
 !> Fluid that moves along with a body in an impact.
 module added_mass_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
@@ -37,8 +38,8 @@ contains
 
     moved = .false.
     do b = 1, blocks%n
-      push = norm2(blocks%contact_force(:, b))
-      rests = push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity) &
+      push = norm(blocks%contact_force(:, b))
+      rests = push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm(fluid%gravity) &
               .and. blocks%contacts(b) > 0   ! a film of liquid alone lets nothing rest
       moved(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. rests)
     end do

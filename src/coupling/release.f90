@@ -13,6 +13,7 @@
 module release_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
   use grid_m, only: grid_t
@@ -265,7 +266,7 @@ contains
       blocks%lagged_force(:, b) = 0.0_wp
       if (is_root()) write (error_unit, '(a)') 'mics: t = '//brief(time, 6)//' s: ' &
         //body_text(b, blocks)//' is out: it passed an open side at ('//to_text(blocks%x(:, b)) &
-        //') m with '//brief(norm2(blocks%v(:, b)))//' m/s'
+        //') m with '//brief(norm(blocks%v(:, b)))//' m/s'
     end do
   end subroutine take_out
 

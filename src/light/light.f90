@@ -15,7 +15,7 @@
 !! that a force F_b + F_d - A g beside gravity and contact moves a block as above.
 module light_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, norm, rotation_matrix, inverse3
+  use vectors_m, only: cube_root, cross, norm, rotation_matrix, inverse3
   use case_types_m, only: case_t
   use boundary_kinds_m, only: side_code, gives_pressure
   use tet_mesh_m, only: shape_t
@@ -79,7 +79,7 @@ contains
     do s = 1, size(blocks%shapes)
       associate (shape => blocks%shapes(s))
         light%facets(s) = split_panels(surface_panels(shape), &
-                                       facet_max*shape%volume**(1.0_wp/3.0_wp))
+                                       facet_max*cube_root(shape%volume))
         light%added(s) = added_inertia_of(shape)
         light%inverse(:, :, s) = inverse3(shape%inertia)
       end associate
@@ -157,10 +157,10 @@ contains
       if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle
       associate (shape => blocks%shapes(blocks%shape(b)))
         way = way_max*shape%smallest_edge
-        speed = max(norm2(blocks%v(:, b)), norm2(blocks%v(:, b) - light%current)) &
-                + norm2(blocks%omega(:, b))*shape%radius
+        speed = max(norm(blocks%v(:, b)), norm(blocks%v(:, b) - light%current)) &
+                + norm(blocks%omega(:, b))*shape%radius
       end associate
-      dt = min(dt, way/(speed + sqrt(way*norm2(gravity)) + tiny(dt)))
+      dt = min(dt, way/(speed + sqrt(way*norm(gravity)) + tiny(dt)))
     end do
   end function step_in_water
 

@@ -15,7 +15,7 @@
 !! that the edges of the body set; two sets of panels are extrapolated with it.
 module panel_method_m
   use kinds_m, only: wp, pi
-  use vectors_m, only: cross
+  use vectors_m, only: norm, cross
   use panels_m, only: panels_t, split_panels
   implicit none
   private
@@ -133,7 +133,7 @@ contains
 
     do k = 1, 3
       r(:, k) = corner(:, k) - x
-      length(k) = norm2(r(:, k))
+      length(k) = norm(r(:, k))
     end do
     height = dot_product(r(:, 1), normal)
     angle = 2.0_wp*atan2(dot_product(r(:, 1), cross(r(:, 2), r(:, 3))), &
@@ -144,7 +144,7 @@ contains
     do k = 1, 3
       m = 1 + mod(k, 3)
       edge = r(:, m) - r(:, k)
-      edge_length = norm2(edge)
+      edge_length = norm(edge)
       out = cross(edge, normal)/edge_length   ! in the plane, out of the triangle
       log_term = log((length(k) + length(m) + edge_length)/(length(k) + length(m) - edge_length))
       inverse = inverse + dot_product(r(:, k), out)*log_term

@@ -1,7 +1,7 @@
 !> The surface of a block as flat triangles.
 module panels_m
   use kinds_m, only: wp
-  use vectors_m, only: cross
+  use vectors_m, only: norm, cross
   use tet_mesh_m, only: shape_t
   implicit none
   private
@@ -59,7 +59,7 @@ contains
       m = 0
       do i = 1, n
         k = longest_edge(corner(:, :, i))
-        if (norm2(corner(:, next(k), i) - corner(:, k, i)) <= longest) then
+        if (norm(corner(:, next(k), i) - corner(:, k, i)) <= longest) then
           halves(:, :, m + 1) = corner(:, :, i)
           m = m + 1
         else
@@ -93,7 +93,7 @@ contains
 
     do i = 1, size(corner, 3)
       a(:, i) = 0.5_wp*cross(corner(:, 2, i) - corner(:, 1, i), corner(:, 3, i) - corner(:, 1, i))
-      flat(i) = .not. norm2(a(:, i)) > 0.0_wp
+      flat(i) = .not. norm(a(:, i)) > 0.0_wp
     end do
     m = count(.not. flat)
     allocate (panels%corner(3, 3, m), panels%centre(3, m), panels%normal(3, m), panels%area(m))
@@ -102,8 +102,8 @@ contains
       panels%n = panels%n + 1
       panels%corner(:, :, panels%n) = corner(:, :, i)
       panels%centre(:, panels%n) = sum(corner(:, :, i), 2)/3.0_wp
-      panels%area(panels%n) = norm2(a(:, i))
-      panels%normal(:, panels%n) = a(:, i)/norm2(a(:, i))
+      panels%area(panels%n) = norm(a(:, i))
+      panels%normal(:, panels%n) = a(:, i)/norm(a(:, i))
     end do
   end function panels_of
 
@@ -112,7 +112,7 @@ contains
     real(wp), intent(in) :: corner(3, 3)   !! [m]
     integer :: k
 
-    longest_edge = maxloc([(norm2(corner(:, next(k)) - corner(:, k)), k=1, 3)], 1)
+    longest_edge = maxloc([(norm(corner(:, next(k)) - corner(:, k)), k=1, 3)], 1)
   end function longest_edge
 
   !> The corner after corner k.

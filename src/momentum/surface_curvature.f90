@@ -6,6 +6,7 @@
 !! there are none the divergence of the normals; both are counted.
 module surface_curvature_m
   use kinds_m, only: wp, i8
+  use vectors_m, only: norm
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
@@ -174,7 +175,7 @@ contains
     real(wp) :: normal(3)
 
     normal = unit_normal(c(at(1) - 1:at(1) + 1, at(2) - 1:at(2) + 1, at(3) - 1:at(3) + 1))/grid%h
-    normal = normal/max(norm2(normal), tiny(1.0_wp))
+    normal = normal/max(norm(normal), tiny(1.0_wp))
   end function normal_at
 
   !> Mean of the neighbours that have heights, or the divergence of the normals.

@@ -8,6 +8,7 @@
 !! one instead (`wall_layer_m`).
 module viscous_links_m
   use kinds_m, only: wp, i8
+  use vectors_m, only: cube_root
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: drags, is_wall, no_side
   use solid_geometry_m, only: solid_geometry_t, bounded_link
@@ -186,7 +187,7 @@ contains
     real(wp) :: spacing
     integer :: m, f(3)
 
-    spacing = grid%volume**(1.0_wp/3.0_wp)
+    spacing = cube_root(grid%volume)
     self%walls%n = 2*solid%n_link
     call bytes_for_walls(self%walls%n, self%walls)
     !$omp parallel do private(f) schedule(static)

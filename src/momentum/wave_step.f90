@@ -1,6 +1,7 @@
 !> The longest step for the shortest waves of a grid: the surface moves explicitly.
 module wave_step_m
   use kinds_m, only: wp, pi
+  use vectors_m, only: norm
   use case_types_m, only: fluid_t
   implicit none
   private
@@ -21,7 +22,7 @@ contains
 
     dt = huge(1.0_wp)
     if (fluid%single_phase) return
-    drive = norm2(fluid%gravity)*abs(fluid%liquid_density - fluid%gas_density)
+    drive = norm(fluid%gravity)*abs(fluid%liquid_density - fluid%gas_density)
     if (drive > 0.0_wp) dt = sqrt(h*(fluid%liquid_density + fluid%gas_density)/drive)
   end function gravity_step
 

@@ -2,6 +2,7 @@
 module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
+  use vectors_m, only: norm
   use parallel_m, only: global_max
   use exact_sum_m, only: accumulator_size, no_terms, exact_add, merge_accumulators, exact_totals
   use case_types_m, only: fluid_t
@@ -240,7 +241,7 @@ contains
     real(wp) :: normal(3)
 
     normal = change/h
-    depth = 0.5_wp*dot_product(gravity, h*normal)/max(norm2(normal), tiny(depth))
+    depth = 0.5_wp*dot_product(gravity, h*normal)/max(norm(normal), tiny(depth))
   end function below
 
   !> Largest difference of the fluid that a cell of plane k holds from its open volume [V].

@@ -11,6 +11,7 @@
 module energy_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use case_types_m, only: case_t
   use boundary_kinds_m, only: is_wall, gives_velocity
   use grid_m, only: grid_t
@@ -62,7 +63,7 @@ contains
                    .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp) .and. blocks%path(b)%n == 0
     end do
     if (.not. self%known) return
-    g = norm2(case%fluid%gravity)
+    g = norm(case%fluid%gravity)
     d = maxloc(abs(case%fluid%gravity), 1)
     self%floor = floor_surface*case%fluid%liquid_density*g*grid%h(d)**2*product(grid%length) &
                  /grid%length(d)

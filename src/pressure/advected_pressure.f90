@@ -11,6 +11,7 @@
 !! guess of the pressure is wrong, since the pressure stage solves for what it lacks.
 module advected_pressure_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
@@ -86,7 +87,7 @@ contains
       do j = a(2), z(2)
         do i = a(1), z(1)
           arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
-          share = min(1.0_wp, (far - norm2(arm)/bodies%radius(b))/(far - 1.0_wp))
+          share = min(1.0_wp, (far - norm(arm)/bodies%radius(b))/(far - 1.0_wp))
           if (share <= 0.0_wp) cycle
           near(i, j, k) = near(i, j, k) + share
           way(i, j, k, :) = way(i, j, k, :) &

@@ -1,6 +1,7 @@
 !> What `--check` prints: what a run of this case will do, before anything is done.
 module case_plan_m
   use kinds_m, only: wp, i8
+  use vectors_m, only: cube_root, norm
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, contact_input_t, place_t, is_given, &
     smallest_spacing, has_flow, contact_of, not_resolved
@@ -199,7 +200,7 @@ contains
       write (unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
         'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     end if
-    g = norm2(case%fluid%gravity)
+    g = norm(case%fluid%gravity)
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
@@ -431,9 +432,9 @@ contains
       real(wp), intent(in) :: time
 
       awake = max(case%run%t_end - time, 0.0_wp)
-      associate (g => norm2(case%fluid%gravity))
+      associate (g => norm(case%fluid%gravity))
         if (case%contact%sleep .and. s > 0 .and. g > 0.0_wp) awake = min(awake, &
-          time_awake*sqrt(shapes(s)%volume**(1.0_wp/3.0_wp)/g))
+          time_awake*sqrt(cube_root(shapes(s)%volume)/g))
       end associate
     end function awake
   end function block_seconds
@@ -462,7 +463,7 @@ contains
     call entry(unit, '  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
     call choose_law(case%contact, law)
-    heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
+    heaviest = load_of(heaviest_mass(case, shapes), norm(case%fluid%gravity))
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
@@ -472,7 +473,7 @@ contains
       call entry(unit, 'stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))
       if (units /= ' N/m') cycle
       call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
-                 //' m/s, '//brief(mass*norm2(case%fluid%gravity)/k)//' m at rest')
+                 //' m/s, '//brief(mass*norm(case%fluid%gravity)/k)//' m at rest')
     end do
   end subroutine print_body_steps
 

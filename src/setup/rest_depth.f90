@@ -1,6 +1,7 @@
 !> How far blocks give way at rest: a warning of `--check`.
 module rest_depth_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use errors_m, only: problems_t, brief
   use case_types_m, only: case_t
   use drops_m, only: count_of_shape
@@ -33,7 +34,7 @@ contains
         //'of an impact at least')
     end if
     call choose_law(case%contact, law)
-    heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
+    heaviest = load_of(heaviest_mass(case, shapes), norm(case%fluid%gravity))
     do s = 1, size(shapes)
       if (n_free(case, shapes(s)) == 0 .or. .not. extreme_of_family(shapes, s)) cycle
       depth = rest_depth(case, shapes(s), law, heaviest)
@@ -70,7 +71,7 @@ contains
     real(wp) :: mass, reduced, own, give, k
 
     mass = shape%density*shape%volume
-    own = mass*norm2(case%fluid%gravity)
+    own = mass*norm(case%fluid%gravity)
     if (shape%kind /= 'sphere') own = own/supports
     give = give_share*shape%smallest_edge
     reduced = mass

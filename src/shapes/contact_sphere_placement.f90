@@ -5,7 +5,7 @@
 !! names the spheres inscribed in the tetrahedra, and dense spheres (`dense_spheres_m`).
 module contact_sphere_placement_m
   use kinds_m, only: wp, pi
-  use vectors_m, only: cross, norm
+  use vectors_m, only: cube_root, cross, norm
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t, opposite
   implicit none
@@ -27,7 +27,7 @@ contains
       x = shape%point(:, shape%tet(:, tet(m)))
       shape%sphere_centre(:, m) = sum(x, 2)/4.0_wp
       ! the sphere has the volume of the tetrahedron
-      shape%sphere_radius(m) = (0.75_wp*tet_volume(x)/pi)**(1.0_wp/3.0_wp)
+      shape%sphere_radius(m) = cube_root(0.75_wp*tet_volume(x)/pi)
     end do
   end subroutine place_at_centroids
 

@@ -9,7 +9,7 @@
 module dense_spheres_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
-  use vectors_m, only: cross, norm
+  use vectors_m, only: norms, cross, norm
   use tet_mesh_m, only: shape_t, max_facet_corners
   implicit none
   private
@@ -50,7 +50,7 @@ contains
       facets%x(:, :n, m) = shape%point(:, shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
       associate (x => facets%x(:, :n, m))
         facets%middle(:, m) = sum(x, 2)/real(n, wp)
-        facets%bounding_radius(m) = maxval(norm2(x - spread(facets%middle(:, m), 2, n), 1))
+        facets%bounding_radius(m) = maxval(norms(x - spread(facets%middle(:, m), 2, n)))
         normal = 0.0_wp
         do k = 2, n - 1
           normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))

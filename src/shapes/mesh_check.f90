@@ -1,6 +1,7 @@
 !> Makes a mesh of tetrahedra from outside fit for the program, or says what is wrong with it.
 module mesh_check_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use errors_m, only: to_text
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: surface_of_tets, chain_of, opposite
@@ -39,7 +40,7 @@ contains
       longest = 0.0_wp
       do a = 1, 3
         do b = a + 1, 4
-          longest = max(longest, norm2(x(:, a) - x(:, b)))
+          longest = max(longest, norm(x(:, a) - x(:, b)))
         end do
       end do
       if (abs(v) <= flat_tet*longest**3) n = n + 1

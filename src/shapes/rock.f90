@@ -8,6 +8,7 @@
 !! edges of which are the body axes, x the longest, z the shortest.
 module rock_m
   use kinds_m, only: wp
+  use vectors_m, only: cube_root, norm
   use case_types_m, only: shape_input_t
   use random_counter_m, only: uniform
   use polyhedron_m, only: polyhedron_t, polyhedron_of_box, cut_polyhedron, polyhedron_moments, &
@@ -56,7 +57,7 @@ contains
       edge = huge(edge)
       do v = 1, form%n
         do k = 1, 3
-          edge = min(edge, norm2(form%x(:, form%adjacent(k, v)) - form%x(:, v)))
+          edge = min(edge, norm(form%x(:, form%adjacent(k, v)) - form%x(:, v)))
         end do
       end do
       if (edge <= longest) cycle
@@ -72,7 +73,7 @@ contains
     call stretch([input%elongation, width, 1.0_wp], stone)
     call polyhedron_moments(stone, volume, moment)
     stone%x(:, :stone%n) = stone%x(:, :stone%n) &
-      *(rock_mass(input, input%member)/(input%density*volume))**(1.0_wp/3.0_wp)
+      *cube_root(rock_mass(input, input%member)/(input%density*volume))
     points%same = same_point*maxval(abs(stone%x(:, :stone%n)))
     call polyhedron_faces(stone, n_faces, first, corner)
     call begin_part(parts)
@@ -157,7 +158,7 @@ contains
         slope = swing
       end if
       normal(:, p) = normal(:, p) + slope*(2*u(:3) - 1.0_wp)
-      normal(:, p) = normal(:, p)/norm2(normal(:, p))
+      normal(:, p) = normal(:, p)/norm(normal(:, p))
     end do
   end subroutine draw_planes
 

@@ -8,7 +8,7 @@ module shapes_builtin_m
   use case_types_m, only: shape_input_t, size_count, member_name
   use named_files_m, only: found_file
   use tet_mesh_m, only: shape_t, surface_of_tets
-  use vectors_m, only: cross
+  use vectors_m, only: cube_root, norm, norms, cross
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
   use rock_m, only: build_rock, share_in_grade
@@ -88,8 +88,8 @@ contains
     shape%inertia = inertia_about_origin(shape%point, shape%flow_tet, shape%density)
     call place_spheres(input, shape, message)
     if (len(message) > 0) return
-    shape%radius = max(maxval(norm2(shape%point, 1)), &
-                       maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius))
+    shape%radius = max(maxval(norms(shape%point)), &
+                       maxval(norms(shape%sphere_centre) + shape%sphere_radius))
   end subroutine make_shape
 
   !> Contact spheres as the group asks for; `message` says if they would be too many.
@@ -445,7 +445,7 @@ contains
       do j = 0, frequency
         do i = 0, frequency - j
           direction = matmul(vertex(:, face(:, f)), real([frequency - i - j, i, j], wp))
-          call find_or_add(direction/norm2(direction), point, n_point, number(i, j))
+          call find_or_add(direction/norm(direction), point, n_point, number(i, j))
         end do
       end do
       do j = 0, frequency - 1
@@ -459,7 +459,7 @@ contains
       end do
     end do
     call volume_and_centroid(point, shape%tet, volume, direction)
-    shape%point = point*(radius*(4.0_wp*pi/(3.0_wp*volume))**(1.0_wp/3.0_wp))
+    shape%point = point*(radius*cube_root(4.0_wp*pi/(3.0_wp*volume)))
   end subroutine build_sphere
 
   !> Corners (edge 2) and outward faces of an icosahedron.
@@ -495,7 +495,7 @@ contains
     pure logical function joined(i, j)
       integer, intent(in) :: i, j
 
-      joined = norm2(vertex(:, i) - vertex(:, j)) < 2.1_wp
+      joined = norm(vertex(:, i) - vertex(:, j)) < 2.1_wp
     end function joined
   end subroutine make_icosahedron
 

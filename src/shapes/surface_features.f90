@@ -5,7 +5,7 @@
 !! (`surface_search_m`).
 module surface_features_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, norm
+  use vectors_m, only: norms, cross, norm
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_build
   use surface_search_m, only: surface_t, found_t, search_surface
@@ -186,7 +186,7 @@ contains
     integer :: e, c
 
     allocate (is_corner(size(shape%point, 2)))
-    is_corner = norm2(point_normal, 1) > 0.0_wp
+    is_corner = norms(point_normal) > 0.0_wp
     do e = 1, size(edge, 2)
       along = shape%point(:, edge(2, e)) - shape%point(:, edge(1, e))
       along = along/norm(along)
@@ -309,7 +309,7 @@ contains
     end do
     surface%low = minval(low, 2)
     surface%high = maxval(high, 2)
-    surface%bounding_radius = maxval(norm2(shape%point(:, shape%facet_point), 1))
+    surface%bounding_radius = maxval(norms(shape%point(:, shape%facet_point)))
     call bins_build(low, high, 2*surface%length, surface%facets)
     call bins_build(surface%vertex, surface%vertex, 2*surface%length, surface%vertices)
     n = size(surface%edge)

@@ -7,6 +7,7 @@
 !! unmerged.
 module merged_cells_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t, edge_in, centre_in_fluid
@@ -352,8 +353,8 @@ contains
         do i = -1, 1
           if (.not. centre_in_fluid(grid, solid, c + [i, j, k])) cycle
           way = real([i, j, k], wp)*(grid%h/grid%h(1))
-          if (dot_product(normal, way)/norm2(way) <= along) cycle
-          along = dot_product(normal, way)/norm2(way)
+          if (dot_product(normal, way)/norm(way) <= along) cycle
+          along = dot_product(normal, way)/norm(way)
           steps(:, 1) = [i, j, k]
           share(1) = 1.0_wp
         end do

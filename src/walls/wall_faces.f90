@@ -2,6 +2,7 @@
 !! and that of the wall.
 module wall_faces_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
   use boundary_kinds_m, only: no_side
@@ -143,7 +144,7 @@ contains
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       arm = nearest_arm(grid, x_wall, predicted%x(:, body))
       n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
-      n = n/max(norm2(n), tiny(1.0_wp))
+      n = n/max(norm(n), tiny(1.0_wp))
       u = flow%u(c(1), c(2), c(3), :)
       if (a%in_liquid(c(1), c(2), c(3))) then
         wall = wall_velocity(predicted%motion(:, body), arm)

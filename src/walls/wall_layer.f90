@@ -7,6 +7,7 @@
 !! slip, as without viscosity.
 module wall_layer_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t, centre_in_fluid
   use rigid_motion_m, only: rigid_motion_t
@@ -206,7 +207,7 @@ contains
         merged%wall_speed(2*m - 2 + s) = 0.0_wp
         if (.not. grid%owns(c)) cycle
         if (solid%inside(c(1), c(2), c(3)) /= 0) cycle
-        merged%wall_speed(2*m - 2 + s) = norm2(u(c(1), c(2), c(3), :) &
+        merged%wall_speed(2*m - 2 + s) = norm(u(c(1), c(2), c(3), :) &
           - velocity_in_cell(grid, bodies, solid%link_body(s, m), c))
       end do
     end do

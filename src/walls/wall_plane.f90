@@ -2,6 +2,7 @@
 !! are, and the apertures behind it (docs/theory.md, section 17).
 module wall_plane_m
   use kinds_m, only: wp
+  use vectors_m, only: norm
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, wall_area, link_to_wall
   use plic_m, only: unit_constant, unit_volume
@@ -23,8 +24,8 @@ contains
     real(wp) :: n(3)
 
     n = wall_area(grid, solid, c)
-    if (norm2(n) > min_normal*minval(grid%area)) then
-      n = n/norm2(n)
+    if (norm(n) > min_normal*minval(grid%area)) then
+      n = n/norm(n)
     else
       n = 0.0_wp
     end if

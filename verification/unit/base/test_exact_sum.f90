@@ -23,6 +23,7 @@ contains
     call test_orders()
     call test_blocks()
     call test_exact_cases()
+    call test_units()
     call test_many_terms()
     call test_columns()
     call test_dots()
@@ -111,6 +112,23 @@ contains
         2.0_wp**(i + 1), 0.0_wp)
     end do
   end subroutine test_exact_cases
+
+  !> In units that are powers of two apart a sum has the same digits, though most of it cancels.
+  subroutine test_units()
+    real(wp) :: x(n), s
+    integer :: k, cancels, different
+
+    different = 0
+    do cancels = 0, 75, 5
+      x = a
+      x(2::2) = -x(1::2)*(1.0_wp + 0.37_wp*2.0_wp**(-cancels))
+      s = exact_sum(x)
+      do k = -75, 75
+        if (abs(exact_sum(scale(x, k)) - scale(s, k)) > 0.0_wp) different = different + 1
+      end do
+    end do
+    call check('same digits in 151 units', different, 0)
+  end subroutine test_units
 
   !> As many terms as the largest grid has cells, 2**31, and more: the sums of two halves are merged
   !! until there are so many. Counts of all bins grow as fast as they can, up and down.
