@@ -5,10 +5,25 @@ from pathlib import Path
 
 import pytest
 
+from worlds import similarity
 from worlds.__main__ import LAWS, judge
 
 FAILED = tomllib.loads((Path(__file__).parent / "worlds" / "failed.toml").read_text())
-SEEDS = {"still": 30, "balance": 12, "restart": 4, "machine": 2, "froude": 0}
+SEEDS = {
+    "still": 30,
+    "balance": 12,
+    "restart": 4,
+    "machine": 2,
+    "froude": 10,
+    "looks": 2,
+    "order": 2,
+    "tool": 1,
+    "drops": 2,
+    "units": 2,
+    "mirror": 2,
+    "turn": 3,
+    "axes": 3,
+}
 WORLDS = [(law, seed) for law, n in SEEDS.items() for seed in range(1, n + 1)]
 WORLDS += [(row["law"], row["seed"]) for row in FAILED.get("failed", [])]
 KNOWN = {
@@ -22,6 +37,12 @@ def test_the_law_holds_in_the_world(law: str, seed: int, request: pytest.Fixture
     if (law, seed) in KNOWN:
         request.applymarker(pytest.mark.xfail(reason=KNOWN[law, seed], strict=True))
     assert judge(law, seed) == ""
+
+
+@pytest.mark.parametrize("name", similarity.PAIRS)
+def test_bits_stay_in_other_units(name: str, tmp_path: Path) -> None:
+    """The worlds that showed what broke this law at first."""
+    similarity.froude(similarity.pair(name), tmp_path)
 
 
 def test_every_law_is_tested() -> None:

@@ -21,7 +21,7 @@ from hypothesis import seed as seeded
 from hypothesis.internal.conjecture.providers import HypothesisProvider
 from hypothesis.strategies import SearchStrategy
 
-from worlds import balance, draw, indifference, similarity
+from worlds import balance, draw, indifference, similarity, symmetry
 from worlds.world import Broken, World
 
 Law = tuple[SearchStrategy[World], Callable[[World, Path], None]]
@@ -29,6 +29,14 @@ LAWS: dict[str, Law] = {
     "still": (draw.still(), balance.stays_still),
     "balance": (draw.world(), balance.balance),
     "froude": (draw.world(), similarity.froude),
+    "units": (draw.world(), similarity.units),
+    "mirror": (draw.world(("coupled", "fluid", "dry"), plain=True), symmetry.mirror),
+    "turn": (draw.world(("coupled", "fluid", "dry"), plain="single"), symmetry.turn),
+    "axes": (draw.world(("coupled", "fluid", "dry"), plain="single"), symmetry.axes),
+    "looks": (draw.world(), indifference.looks),
+    "order": (draw.world(), indifference.order),
+    "drops": (draw.world(("coupled", "dry", "light"), shapes=draw.MADE), indifference.drops),
+    "tool": (draw.world(), indifference.tool),
     "machine": (draw.world(), indifference.machine),
     "restart": (draw.world(), indifference.restart),
 }

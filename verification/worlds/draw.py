@@ -21,8 +21,9 @@ REACH = {  # farthest point of a shape from its centre, over its size
     "reef_cube": 0.867,
     "rock": 1.0,
 }
-FLAT = {"cube": 0.5, "box": 0.5, "cylinder": 0.5, "sphere": 0.5, "reef_cube": 0.5}
-"""Height of the centre over the floor, over the size, of shapes that lie upright."""
+EVEN = ("cube", "sphere", "box", "hexapod")
+"""Shapes that are their own image in mirrors across their axes."""
+MADE = tuple(kind for kind in REACH if kind != "rock")
 
 
 def number(low: float, high: float) -> st.SearchStrategy[float]:
@@ -161,12 +162,14 @@ def still(draw: Draw) -> World:
 
 
 @st.composite
-def body(draw: Draw, k: int, place: list[float], across: float, time: float) -> tuple[str, Group]:
-    """Block k, which is held, moved, free, dropped or lowered near a place."""
+def body(
+    draw: Draw, k: int, place: list[float], across: float, time: float, plain: bool
+) -> tuple[str, Group]:
+    """Block k near a place, which is held, moved or free; if not `plain`, dropped or lowered."""
     speed, lazy = sqrt(GRAVITY * across), draw(number(0.0, 1.0))
     here = rounded([p + across * draw(around(0.05)) for p in place])
     found: Group = {"shape": f"s{k}", "position": here, "quaternion": draw(attitude())}
-    role = draw(one_of("free", "held", "moved", "dropped", "lowered"))
+    role = draw(one_of("free", "held", "moved", *(() if plain else ("dropped", "lowered"))))
     if role == "held":
         return "body", {**found, "fixed": True}
     if role == "lowered":
@@ -196,8 +199,14 @@ def contact(draw: Draw, across: float) -> Group:
 
 
 @st.composite
-def world(draw: Draw, kinds: tuple[str, ...] = ("coupled", "fluid", "dry", "light")) -> World:
-    """One to eight blocks of any kind in a tank with or without water."""
+def world(
+    draw: Draw,
+    kinds: tuple[str, ...] = ("coupled", "fluid", "dry", "light"),
+    plain: bool | str = False,
+    shapes: tuple[str, ...] = tuple(REACH),
+) -> World:
+    """One to eight blocks of any kind in a tank with or without water. `plain`: there from the
+    start, of shapes that are their own mirror image, the water in boxes; 'single': everywhere."""
     across = draw(power(0.01, 5.0))  # of a block [m]
     physics = draw(one_of(*kinds))
     cell = [across / draw(st.integers(4, 7)) * draw(number(1.0, a)) for a in (1.4, 0.7, 1.3)]
@@ -214,11 +223,21 @@ def world(draw: Draw, kinds: tuple[str, ...] = ("coupled", "fluid", "dry", "ligh
         ("run", run),
         ("grid", {"cells": cells, "length": length}),
         ("boundary", ends),
-        ("fluid", {**draw(fluid(across)), "water_level": length[2] * draw(number(0.4, 0.8))}),
+        ("fluid", draw(fluid(across))),
         ("numerics", draw(numerics())),
         ("contact", draw(contact(across))),
     ]
-    if draw(st.booleans()):
+    level = length[2] * draw(number(0.4, 0.8))
+    if plain == "single":
+        kept = ("liquid_density", "liquid_viscosity", "gravity")
+        alone = {name: value for name, value in groups[3][1].items() if name in kept}
+        groups[3] = ("fluid", {**alone, "single_phase": True})
+        ends["z_max"] = "slip"
+    elif plain:
+        groups.append(("water", {"min": [0.0, 0.0, 0.0], "max": [*length[:2], level]}))
+    else:
+        groups[3][1]["water_level"] = level
+    if draw(st.booleans()) and plain != "single":
         corner = rounded([c * draw(number(0.3, 0.7)) for c in length])
         groups.append(("water", {"min": [0.0, 0.0, 0.0], "max": [*corner[:2], 0.95 * length[2]]}))
     slots = [
@@ -227,6 +246,6 @@ def world(draw: Draw, kinds: tuple[str, ...] = ("coupled", "fluid", "dry", "ligh
     for b, slot in enumerate(slots):
         place = [(s + 0.5) * c / n for s, c, n in zip(slot, length, places, strict=True)]
         place[2] = (slot[2] + 0.6) * 1.2 * across
-        groups.append(("shape", draw(shape(f"s{b}", across, tuple(REACH)))))
-        groups.append(draw(body(b, place, across, run["t_end"])))
+        groups.append(("shape", draw(shape(f"s{b}", across, EVEN if plain else shapes))))
+        groups.append(draw(body(b, place, across, run["t_end"], plain)))
     return World(groups)

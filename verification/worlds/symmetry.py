@@ -1,0 +1,118 @@
+"""A world in a mirror, turned, or with its axes exchanged together with gravity."""
+
+from pathlib import Path
+
+import numpy as np
+
+from micstools.shapes.geometry import Array
+from worlds.world import Broken, Group, World
+
+FEW = 3  # steps in which round-off has not grown
+ROUND_OFF = 1e-9  # of the largest number of its kind
+MIRROR_X, MIRROR_Y = np.diag([-1, 1, 1]), np.diag([1, -1, 1])
+QUARTER = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+AXES = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+HALF = np.sqrt(0.5)
+TURNS = {"QUARTER": [HALF, 0, 0, HALF], "AXES": [0.5, 0.5, 0.5, 0.5]}
+POLAR = ("velocity", "fluid_force", "contact_force")
+AXIAL = ("angular_velocity", "fluid_torque", "contact_torque")
+
+
+def changed(world: World, q: Array) -> World:
+    """The world whose places and directions are those of `q` times its own; in a mirror for shapes
+    that are their own mirror image."""
+    length = np.abs(q) @ world.value("grid", "length")
+    corner = np.where(q.sum(axis=1) < 0, length, 0.0)  # image of the origin
+    det = round(float(np.linalg.det(q)))
+
+    def attitude(a: list[float]) -> list[float]:
+        if det < 0:
+            return [a[0], *(det * q @ a[1:])]
+        return product(turn_of(q), a)
+
+    def change(name: str, group: Group) -> Group:
+        group = dict(group)
+        if name == "boundary":
+            return {side(q, k): v for k, v in group.items()}
+        for key in ("cells", "length"):
+            if key in group:
+                group[key] = [type(group[key][0])(v) for v in np.abs(q) @ group[key]]
+        for key in ("position", "velocity", "gravity", "angular_velocity"):
+            if key in group:
+                sign = det if key in AXIAL else 1
+                moved = sign * q @ group[key] + (corner if key == "position" else 0.0)
+                group[key] = moved.tolist()
+        if name == "water":
+            ends = np.array([q @ group[k] + corner for k in ("min", "max")])
+            group |= {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
+        if "quaternion" in group:
+            group["quaternion"] = [float(c) for c in attitude(group["quaternion"])]
+        return group
+
+    return World([(n, change(n, g)) for n, g in world.groups])
+
+
+def side(q: Array, name: str) -> str:
+    """Name of the side to which a side goes."""
+    d, end = "xyz".index(name[0]), name[2:5]
+    to = int(np.abs(q[:, d]).argmax())
+    if q[to, d] < 0:
+        end = {"min": "max", "max": "min"}[end]
+    return f"{'xyz'[to]}_{end}"
+
+
+def turn_of(q: Array) -> list[float]:
+    """The quaternion of a turn."""
+    return TURNS["QUARTER" if (q == QUARTER).all() else "AXES"]
+
+
+def product(a: list[float], b: list[float]) -> list[float]:
+    """Rotation b followed by rotation a."""
+    v, w = np.array(a[1:]), np.array(b[1:])
+    return [a[0] * b[0] - v @ w, *(a[0] * w + b[0] * v + np.cross(v, w))]
+
+
+def same(world: World, folder: Path, q: Array) -> None:
+    """The first steps of both worlds agree to round-off, if the pressure is solved so far."""
+    world = world.changed("numerics", divergence_tolerance=1e-11)
+    one, other = world.run(folder / "one"), changed(world, q).run(folder / "other")
+    det = round(float(np.linalg.det(q)))
+    rows = min(FEW + 1, len(one.series.time), len(other.series.time))
+    g, h = float(np.linalg.norm(one.gravity)), float(one.grid.spacing.max())
+    weight = world.value("fluid", "liquid_density") * g * h**3
+    least = {"velocity": 0.01 * (g * h) ** 0.5, "angular_velocity": 0.01 * (g / h) ** 0.5}
+    least |= {name: weight for name in ("fluid_force", "contact_force")}
+    least |= {name: weight * h for name in ("fluid_torque", "contact_torque")}
+    found = {}
+    for name in (*POLAR, *AXIAL):
+        sign = det if name in AXIAL else 1
+        x = sign * getattr(one.bodies, name)[:rows] @ q.T
+        found[name] = far(x, getattr(other.bodies, name)[:rows], least[name])
+    for name, some in (("kinetic_energy_fluid", weight * h), ("liquid_volume", 0.0), ("time", 0.0)):
+        numbers = (getattr(run.series, name)[:rows] for run in (one, other))
+        found[name] = far(*numbers, some)
+    worst = max(found, key=lambda name: found[name])
+    if found[worst] > ROUND_OFF:
+        raise Broken(f"{worst} differs by {found[worst]:.1e} within {rows - 1} steps")
+
+
+def far(a: Array, b: Array, least: float) -> float:
+    """Largest difference over the largest number, or over one that is small if that is more."""
+    scale = np.nanmax(np.abs(a), initial=least)
+    return float(np.nanmax(np.abs(a - b), initial=0.0) / scale) if scale > 0 else 0.0
+
+
+def mirror(world: World, folder: Path) -> None:
+    """In a mirror across x, and across y."""
+    same(world, folder / "x", MIRROR_X)
+    same(world, folder / "y", MIRROR_Y)
+
+
+def turn(world: World, folder: Path) -> None:
+    """A quarter turn about the vertical."""
+    same(world, folder, QUARTER)
+
+
+def axes(world: World, folder: Path) -> None:
+    """Gravity along x, and all else with it."""
+    same(world, folder, AXES)
