@@ -42,6 +42,7 @@ module step_m
   use outflow_m, only: update_outflow
   use rigid_body_m, only: follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
+  use block_record_m, only: update_record
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
   use release_m, only: release_due_blocks, let_go_lowered, take_out, next_release, nothing_to_come
@@ -175,6 +176,7 @@ contains
     report%substeps = contact%substeps
     report%contacts_solved = contact%info == 0
     any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
+    call update_record(sim%clock%t, sim%clock%dt, sim%case%run%rest_speed, sim%blocks)
     call sim%clock%store_speed(maxval(sim%blocks%speed), &
                                any_free .and. nothing_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return

@@ -36,6 +36,7 @@ BODY_ROWS = {
     "fluid_torque": ("N m", (N, 3)),
     "contact_force": ("N", (N, 3)),
     "contact_torque": ("N m", (N, 3)),
+    "contact_force_max": ("N", (N,)),
     "contacts": ("1", (N,)),
     "on_floor": ("1", (N,)),
 }
@@ -141,6 +142,7 @@ def test_names_units_and_shapes(wet: Path) -> None:
         assert set(h5["bodies"]) == {
             *BODY_ROWS, "shape", "name", "mass", "fixed",
             "release_time", "entry_time", "exit_time", "raised", "planned", "status",
+            "impact_speed", "rest_since",
         }  # fmt: skip
         for axis, cells in zip("xyz", (24, 16, 32), strict=True):
             assert h5[f"grid/{axis}"].shape == (cells + 1,)
@@ -685,7 +687,7 @@ def test_no_room_for_files(tmp_path: Path) -> None:
     """A limit stands for a full disk: exit code 4, the file is named, older rows can be read."""
 
     def no_large_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (690_000, 690_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (720_000, 720_000))
 
     code, said = run(tmp_path / "run", preexec_fn=no_large_files)
     assert code == 4, said

@@ -5,7 +5,7 @@
 module contacts_m
   use kinds_m, only: wp
   use rigid_body_m, only: blocks_t, begin_step, drift, kick_body, hold_sleepers, look_ahead, &
-    follow_motions, find_speeds
+    follow_motions, fastest_point
   use walls_m, only: walls_t
   use sleep_m, only: update_stillness, store_poses, store_quiet, put_to_sleep, all_still
   use lubrication_m, only: lubricate
@@ -40,6 +40,7 @@ contains
     type(contact_report_t), intent(out) :: report
     real(wp) :: left, dt_b, limit, began
     logical :: changed
+    integer :: b
 
     call begin_step(blocks)
     began = blocks%time
@@ -78,7 +79,11 @@ contains
       report%substeps = report%substeps + 1
     end do
     call follow_motions(began + dt, blocks)
-    call find_speeds(blocks)
+    do b = 1, blocks%n   ! at which the free bodies end their motion
+      blocks%speed(b) = 0.0_wp
+      if (blocks%fixed(b) .or. blocks%asleep(b) .or. .not. blocks%present(b)) cycle
+      blocks%speed(b) = fastest_point(blocks, b)
+    end do
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)

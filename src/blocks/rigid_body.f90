@@ -17,11 +17,11 @@ module rigid_body_m
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   implicit none
   private
-  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share, body_text
+  public :: blocks_t, record_t, blocks_init, release_body, turn_with_fluid, turning_share, body_text
   public :: to_come, lowering, let_go, left_out, out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
-  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point, find_speeds
+  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
   public :: follow_motions, look_ahead, change_by_motion, haste
 
   real(wp), parameter :: turning_share = 0.02_wp
@@ -36,6 +36,15 @@ module rigid_body_m
   type :: given_t
     real(wp), allocatable :: v(:, :), omega(:, :)
   end type given_t
+
+  !> What the results keep of the blocks between rows (`block_record_m`).
+  type :: record_t
+    real(wp), allocatable :: hardest(:)        !! (n) largest contact force since the last row [N]
+    real(wp), allocatable :: impact_speed(:)   !! (n) before the first touch, < 0: none yet [m/s]
+    real(wp), allocatable :: rest_since(:)     !! (n) [s], < 0: it moves
+    real(wp), allocatable :: approach(:, :)
+      !! (3, n) way in this part of it [m], largest speed in it and in the one before [m/s]
+  end type record_t
 
   !> All bodies of a run, in the order of the contract: `&body`, then `&drop`.
   type :: blocks_t
@@ -83,6 +92,7 @@ module rigid_body_m
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
     integer, allocatable :: contacts(:)   !! (n) different counterparts touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them
+    type(record_t) :: record
   end type blocks_t
 
 contains
@@ -107,7 +117,10 @@ contains
       source=.false.)
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
       blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
-    allocate (blocks%exit_time(n), source=-1.0_wp)
+    allocate (blocks%exit_time(n), blocks%record%impact_speed(n), blocks%record%rest_since(n), &
+      source=-1.0_wp)
+    allocate (blocks%record%hardest(n), source=0.0_wp)
+    allocate (blocks%record%approach(3, n), source=0.0_wp)
     allocate (blocks%name(n), blocks%handling(n))
     allocate (blocks%planned(2, n), source=0.0_wp)
     allocate (blocks%on_ground(n), source=.false.)
@@ -550,18 +563,6 @@ contains
       energy = energy - own_mass(blocks, b)*dot_product(gravity, blocks%x(:, b))
     end do
   end function potential_energy
-
-  !> The speeds at which free bodies end their motion (`blocks%speed`).
-  pure subroutine find_speeds(blocks)
-    type(blocks_t), intent(inout) :: blocks
-    integer :: b
-
-    do b = 1, blocks%n
-      blocks%speed(b) = 0.0_wp
-      if (blocks%fixed(b) .or. blocks%asleep(b) .or. .not. blocks%present(b)) cycle
-      blocks%speed(b) = fastest_point(blocks, b)
-    end do
-  end subroutine find_speeds
 
   !> Bound of the speed of all points of body b: that of the centre, and by rotation that of the
   !! point furthest from it [m/s].

@@ -10,6 +10,7 @@ module output_m
   use command_line_m, only: options_t
   use case_types_m, only: case_t, fluid_t, not_resolved
   use bed_m, only: bed_t
+  use block_record_m, only: begin_row
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
@@ -299,6 +300,7 @@ contains
     if (row_wanted) then
       call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
       call state%clock%row_done()
+      call begin_row(state%blocks)
       output%row_step = state%clock%step
     end if
     if (frame_wanted) then
@@ -394,7 +396,10 @@ contains
       call check_files(output)
     end if
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
-      if (row_wanted .and. state%clock%row_due()) call state%clock%row_done()
+      if (row_wanted .and. state%clock%row_due()) then
+        call state%clock%row_done()
+        call begin_row(state%blocks)
+      end if
       if (frame_wanted .and. state%clock%frame_due()) call state%clock%frame_done()
       call write_line(output%progress, state%clock, row, state%blocks)
       if (output%restart_step /= state%clock%step) call save_state(state, output)

@@ -112,6 +112,10 @@ contains
     call list%add('/blocks/contact_torque', 'N m', blocks%contact_torque)
     call list%add('/blocks/contacts', blocks%contacts)
     call list%add('/blocks/on_floor', blocks%on_floor)
+    call list%add('/blocks/hardest', 'N', blocks%record%hardest)
+    call list%add('/blocks/impact_speed', 'm/s', blocks%record%impact_speed)
+    call list%add('/blocks/rest_since', 's', blocks%record%rest_since)
+    call list%add('/blocks/approach', 'm, m/s', blocks%record%approach)
   end subroutine list_blocks
 
   !> The tangential displacements of contact points.

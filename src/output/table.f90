@@ -53,8 +53,8 @@ module table_m
     integer, private :: at = 0         !! column that was listed last
     type(column_t), allocatable, private :: list(:)
   contains
-    procedure, private :: number, vectors, integers, wide_number, wide_numbers, next
-    generic :: column => number, vectors, integers, wide_number, wide_numbers
+    procedure, private :: number, numbers, vectors, integers, wide_number, wide_numbers, next
+    generic :: column => number, numbers, vectors, integers, wide_number, wide_numbers
     procedure :: points, cells, field
     procedure :: begin, find_rows, keep, bytes_for_row, read_row
   end type table_t
@@ -98,6 +98,15 @@ contains
 
     call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, [integer ::]), c_loc(x))
   end subroutine number
+
+  !> Numbers, one of each block.
+  subroutine numbers(self, name, units, x)
+    class(table_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(in), target, contiguous :: x(:)
+
+    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, shape(x)), c_loc(x))
+  end subroutine numbers
 
   !> Vectors, one of each block.
   subroutine vectors(self, name, units, x)

@@ -24,8 +24,8 @@ module write_run_m
     close_run_file
 
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
-    'exit_time', 'raised']                   !! datasets with a number per block
-  character(*), parameter :: once_units(*) = ['s', 's', 's', 'm']
+    'exit_time', 'raised', 'impact_speed', 'rest_since']   !! datasets with a number per block
+  character(*), parameter :: once_units(*) = [character(3) :: 's', 's', 's', 'm', 'm/s', 's']
   integer, parameter :: running = -1         !! exit status until the run ends, or if it was killed
 
   type, extends(table_t) :: run_file_t
@@ -83,6 +83,7 @@ contains
     call self%column('/bodies/fluid_torque', 'N m', blocks%fluid_torque)
     call self%column('/bodies/contact_force', 'N', blocks%contact_force)
     call self%column('/bodies/contact_torque', 'N m', blocks%contact_torque)
+    call self%column('/bodies/contact_force_max', 'N', blocks%record%hardest)
     call self%column('/bodies/quaternion', '1', self%q)
     call self%column('/bodies/contacts', '1', blocks%contacts)
     call self%column('/bodies/on_floor', '1', blocks%on_floor)
@@ -213,7 +214,9 @@ contains
     case (1); values = blocks%release_time
     case (2); values = blocks%entry_time
     case (3); values = blocks%exit_time
-    case default; values = blocks%raised
+    case (4); values = blocks%raised
+    case (5); values = blocks%record%impact_speed
+    case default; values = blocks%record%rest_since
     end select
   end function once_values
 

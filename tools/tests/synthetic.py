@@ -192,6 +192,8 @@ def _write_bodies(
     velocity[np.abs(velocity) < 1e-12] = 0.0
     force = mass * np.gradient(velocity, time, axis=0)
     force[..., 2] += mass * 9.81 * (np.linalg.norm(velocity, axis=2) > 0)
+    group["impact_speed"] = np.linalg.norm(velocity, axis=2).max(axis=0)
+    group["rest_since"] = [_still_since(time, position[:, k]) for k in range(n)]
     for name, values in {
         "time": time,
         "position": position,
@@ -206,6 +208,13 @@ def _write_bodies(
         "on_floor": np.zeros_like(touching),
     }.items():
         group[name] = values
+
+
+def _still_since(time: Array, place: Array) -> float:
+    """From when on a block stays where it ends; -1: it moves to the end."""
+    far = np.flatnonzero(np.linalg.norm(place - place[-1], axis=1) > 1e-3 * np.ptp(place) + 1e-9)
+    first = far[-1] + 1 if far.size else 0
+    return float(time[first]) if first < len(time) - 1 else -1.0
 
 
 def _write_series(group: h5py.Group, time: Array, drops: int) -> None:

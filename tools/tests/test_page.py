@@ -274,9 +274,7 @@ def test_numbers_of_each_block(make_run) -> None:
     speed = np.linalg.norm(run.bodies.velocity[:, 3], axis=1)
     assert (found.block, found.released) == (4, 0.0)
     assert found.at_rest == pytest.approx(0.8, abs=0.05)
-    assert found.impact_speed == pytest.approx(speed[19])  # the row before t = 0.4 s
-    run.bodies.velocity[0, 3], run.bodies.contacts[1:5, 3] = 0, 1  # it lay on something first
-    assert block_numbers.impact_speed(run, 3) == found.impact_speed
+    assert found.impact_speed == pytest.approx(speed.max())
     force = np.linalg.norm(run.bodies.contact_force[:, 3], axis=1).max()
     assert found.contact_force == pytest.approx(force)
     assert found.weight == pytest.approx(56e-6 * 2300 * 9.81)

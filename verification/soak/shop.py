@@ -14,7 +14,9 @@ from run_cases import MPI_SETTINGS, Machine
 from same_bits import LOCK, contents, differences
 
 CHANGING = {
-    f"bodies/{name}" for name in ("release_time", "entry_time", "exit_time", "raised", "status")
+    f"bodies/{name}"
+    for name in ("release_time", "entry_time", "exit_time", "raised", "status")
+    + ("impact_speed", "rest_since")
 }
 """Datasets that are written again when a block comes in or is let go."""
 

@@ -149,6 +149,6 @@ def _nan_last(value: float) -> float:
 
 
 def impact_speed(run: Run) -> float:
-    """Largest speed [m/s] of a dropped block in the row before its first touch; nan without one."""
-    found = [block_numbers.impact_speed(run, int(k)) for k in run.bodies.dropped]
-    return max((speed for speed in found if speed == speed), default=float("nan"))
+    """Largest speed [m/s] of a dropped block before its first touch; nan without one."""
+    found = run.bodies.impact_speed[run.bodies.dropped]
+    return float(np.nanmax(found)) if np.isfinite(found).any() else float("nan")

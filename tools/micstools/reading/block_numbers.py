@@ -16,7 +16,7 @@ class BlockNumbers:
     block: int  # number, from 1
     released: float  # [s]
     at_rest: float  # after which it stays where it ends [s]
-    impact_speed: float  # in the row before its first touch [m/s]
+    impact_speed: float  # before its first touch, the largest over a quarter of its length [m/s]
     contact_force: float  # the largest, a mean over a step [N]
     fluid_force: float  # the largest, buoyancy included [N]
     weight: float  # [N]
@@ -39,24 +39,13 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
         block=k + 1,
         released=float(b.release_time[k]),
         at_rest=rest.of_block(run, k).time,
-        impact_speed=impact_speed(run, k),
-        contact_force=_largest(b.contact_force[start:, k]),
+        impact_speed=float(b.impact_speed[k]),
+        contact_force=_largest(b.contact_force_max[start:, k, None]),
         fluid_force=_largest(b.fluid_force[start:, k]),
         weight=float(b.mass[k] * np.linalg.norm(run.gravity)),
         turned=float(attitude_change_deg(b.quaternion[-1, k], b.quaternion[start, k])),
         place=(x, y, z),
     )
-
-
-def impact_speed(run: Run, k: int) -> float:
-    """Speed [m/s] of a block (from 0) in the row before its first touch; nan without one.
-
-    A touch of a block that has not moved yet is none: it may lie on what will let it go.
-    """
-    b = run.bodies
-    speed = np.linalg.norm(b.velocity[:-1, k], axis=1)
-    begins = (b.contacts[1:, k] > 0) & (b.contacts[:-1, k] <= 0) & (speed > 0)
-    return float(speed[np.argmax(begins)]) if begins.any() else float("nan")
 
 
 def _largest(force: np.ndarray) -> float:

@@ -122,7 +122,7 @@ def _rest(run: Run, units: Units) -> list[Check]:
             f"{_numbers([one.block for one in moving])} still moving: block {most.block} by "
             f"{units.length.text(most.moved)} in the last {figure(most.span)} s"
         )
-        wanted = f"all, to {units.length.text(most.limit)}"
+        wanted = f"all, slower than {figure(1e3 * float(run.value('run', 'rest_speed')))} mm/s"
         advice.append("a larger t_end, with --restart")
     if waiting:
         words.append(f"{_numbers(waiting)} not let go by t = {figure(float(b.time[-1]))} s")

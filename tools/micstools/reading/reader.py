@@ -90,6 +90,8 @@ class Bodies:
     planned: Array  # (N, 2) x and y without the random shift, nan in results of older programs [m]
     status: IntArray  # (N) 0 to come, 1 being lowered, 2 released, 3 left out, 4 out of the tank
     exit_time: Array  # (N) when it was taken out behind an open side, infinite: never [s]
+    impact_speed: Array  # (N) of its approach to what it touched first, nan: nothing yet [m/s]
+    rest_since: Array  # (N) since when it is slower than `rest_speed`, nan: it is not [s]
     time: Array  # (T) [s]
     position: Array  # (T, N, 3) [m]
     quaternion: Array  # (T, N, 4) w, x, y, z
@@ -99,6 +101,7 @@ class Bodies:
     fluid_torque: Array  # (T, N, 3) about the centroid [N m]
     contact_force: Array  # (T, N, 3) [N]
     contact_torque: Array  # (T, N, 3) [N m]
+    contact_force_max: Array  # (T, N) largest mean of a step since the row before [N]
     contacts: IntArray  # (T, N) different counterparts touched
     on_floor: IntArray  # (T, N)
 
@@ -471,8 +474,8 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     """The bodies at `most` of the rows; the first `placed` of them are those of `&body`, the others
     drops."""
     group = h5["bodies"]
-    per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED)
-    rows = [f.name for f in fields(Bodies) if f.name not in per_body]
+    per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED, *_KEPT)
+    rows = [f.name for f in fields(Bodies) if f.name not in (*per_body, "contact_force_max")]
     mass = numbers(group, "mass", None)
     n = len(mass)
     for name in rows:
@@ -486,15 +489,32 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     names = [_text(name) for name in group.get("name", [""] * n)]
     if len(shape) != n or len(names) != n or not set(shape) <= set(h5.get("shapes", {})):
         raise ValueError("bodies and shapes do not belong together")
+    hardest = np.linalg.norm(values["contact_force"], axis=2)
+    if "contact_force_max" in group:
+        require_shape(group, "contact_force_max", None, n)
+        hardest = np.maximum(hardest, _thinned(group["contact_force_max"], complete, step))
     return Bodies(
         shape=shape,
         name=names,
         mass=mass,
         fixed=numbers(group, "fixed", n).astype(bool),
         planned=numbers(group, "planned", n, 2) if "planned" in group else np.full((n, 2), np.nan),
+        contact_force_max=hardest,
+        impact_speed=_kept(group, "impact_speed", n),
+        rest_since=_kept(group, "rest_since", n),
         **_handled(group, values, placed),
         **values,
     )
+
+
+_KEPT = ("impact_speed", "rest_since")
+"""Numbers of each body that the program keeps."""
+
+
+def _kept(group: h5py.Group, name: str, n: int) -> Array:
+    """One of them; nan where it is negative, and in results of older programs."""
+    found = numbers(group, name, n) if name in group else np.full(n, -1.0)
+    return np.where(found < 0, np.nan, found)
 
 
 _HANDLED = ("release_time", "entry_time", "exit_time", "raised", "status")

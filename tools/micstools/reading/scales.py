@@ -21,10 +21,3 @@ def reach(run: Run) -> float:
 def weight(run: Run) -> float:
     """Weight of the lightest block in air [N]; zero without gravity."""
     return float(run.bodies.mass.min() * np.linalg.norm(run.gravity))
-
-
-def fall_time(run: Run, length: float) -> float:
-    """Time sqrt(D/g) of a block of the length D [m] to fall half of it [s]; infinite without
-    gravity."""
-    g = float(np.linalg.norm(run.gravity))
-    return float(np.sqrt(length / g)) if g else np.inf
