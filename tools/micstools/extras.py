@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
     "ensemble": ("cryptography", "dask_jobqueue", "distributed"),
-    "survey": ("ezdxf",),
+    "survey": ("ezdxf", "rasterio"),
     "pictures": ("pyvista", "vtk"),
     "serve": ("aiohttp",),
 }

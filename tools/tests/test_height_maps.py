@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rasterio
 from PIL import Image, TiffImagePlugin
 
 from calls import mics_tools
@@ -198,6 +199,101 @@ def test_a_geotiff_without_its_place_is_refused(
 ) -> None:
     with pytest.raises(BadRun, match=said):
         height_maps.load(geotiff(tmp_path / "a.tif", Z.astype(np.float32), keys, tags=tags))
+
+
+FEET = 0.3048
+US_FEET = 1200 / 3937
+
+
+@pytest.mark.parametrize(
+    ("epsg", "told", "unit", "along", "up"),
+    [
+        (32631, "", None, 1.0, 1.0),
+        (32631, "ft", None, 1.0, FEET),
+        (32631, "", "cm", 1.0, 0.01),
+        (2263, "US survey foot", None, US_FEET, US_FEET),
+        (2263, "metre", None, US_FEET, 1.0),
+        (2263, "", "us-ft", US_FEET, US_FEET),
+    ],
+)
+def test_a_geotiff_in_its_own_units(
+    tmp_path: Path, epsg: int, told: str, unit: str | None, along: float, up: float
+) -> None:
+    """Places in the unit of the system, heights in that of the band, packed as 2 z - 30."""
+    path = tmp_path / "a.tif"
+    packed = (2 * (Z[::-1] + 30)).astype(np.int16)
+    with rasterio.open(
+        path, "w", driver="GTiff", width=4, height=3, count=1, dtype="int16", nodata=64,
+        crs=rasterio.CRS.from_epsg(epsg), transform=rasterio.transform.from_origin(100, 206, 2, 2),
+    ) as raster:  # fmt: skip
+        raster.write(packed, 1)
+        raster.scales, raster.offsets, raster.units = (0.5,), (-30.0,), (told,)
+    found = height_maps.load(path, unit=unit)
+    assert found.first == pytest.approx((101 * along, 201 * along))
+    assert found.spacing == pytest.approx((2 * along, 2 * along))
+    assert found.z == pytest.approx(up * np.where(Z == 2, np.nan, Z), nan_ok=True)
+    assert ("from US survey foot to m" in found.remarks) == (along != 1)
+    assert any("times 0.5 plus -30" in r for r in found.remarks)
+
+
+@pytest.mark.parametrize(("code", "factor"), [(9001, 1.0), (9002, FEET), (9003, US_FEET)])
+def test_a_geotiff_with_bare_keys_of_units(tmp_path: Path, code: int, factor: float) -> None:
+    """Of places (3076) and of heights (4099), in a system without a name."""
+    keys = (1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3076, 0, 1, code, 4099, 0, 1, code)
+    path = geotiff(tmp_path / "a.tif", Z.astype(np.float32), keys, tags=SCALE)
+    found = height_maps.load(path)
+    assert found.spacing == pytest.approx((2 * factor, 2 * factor))
+    assert found.z == pytest.approx(factor * Z)
+
+
+def test_heights_of_unknown_unit_are_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    with rasterio.open(
+        path, "w", driver="GTiff", width=4, height=3, count=1, dtype="float32",
+        crs=rasterio.CRS.from_epsg(2263), transform=rasterio.transform.from_origin(100, 206, 2, 2),
+    ) as raster:  # fmt: skip
+        raster.write(Z.astype(np.float32), 1)
+    with pytest.raises(BadRun, match="lies in US survey foot .* give --unit"):
+        height_maps.load(path)
+    with pytest.raises(BadRun, match="unit 'yard' is none of m, cm, mm, ft, us-ft"):
+        height_maps.load(path, unit="yard")
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "along", "up"),
+    [
+        ("x [ft], y [ft], z [m]", None, FEET, 1.0),
+        ("x (cm);y (cm);z (cm)", None, 0.01, 0.01),
+        ("x_ft y_ft z_us-ft", None, FEET, US_FEET),
+        ("x y z", "mm", 0.001, 0.001),
+        ("Easting [m], Northing [m], Elevation [ft]", "cm", 1.0, FEET),
+    ],
+)
+def test_points_in_units_of_their_names(
+    tmp_path: Path, head: str, unit: str | None, along: float, up: float
+) -> None:
+    x, y = np.meshgrid(101 + 2 * np.arange(4), 201 + 2 * np.arange(3))
+    rows = np.column_stack([x.ravel(), y.ravel(), Z.ravel()])
+    text = head + "\n" + "\n".join(" ".join(map(str, row)) for row in rows)
+    found = height_maps.load(save(tmp_path / "a.xyz", text), unit=unit)
+    assert found.spacing == pytest.approx((2 * along, 2 * along)) and found.remarks
+    assert found.z == pytest.approx(up * Z)
+    with pytest.raises(BadRun, match="unit 'fathom' is none of"):
+        height_maps.load(save(tmp_path / "b.xyz", "x [m] y [m] z [fathom]\n0 0 1\n"))
+
+
+def test_doubled_soundings_and_gaps_are_told(tmp_path: Path) -> None:
+    """The order of lines does not decide, and a hole of 10 m in soundings 1 m apart stays one."""
+    x, y = (c.ravel() for c in np.meshgrid(np.arange(41.0), np.arange(31.0)))
+    keep = (np.abs(x - 20) > 5) | (np.abs(y - 15) > 5)
+    rows = [f"{a} {b} {-7.0}" for a, b in zip(x[keep], y[keep], strict=True)]
+    rows.insert(0, "3 3 -5")
+    for text in (rows, rows[::-1]):
+        found = height_maps.load(save(tmp_path / "a.xyz", "\n".join(text)), 1.0)
+        assert found.z[3, 3] == -6.0 and found.z[3, 4] == -7.0
+        assert np.isnan(found.z[15, 20]) and found.z[15, 14] == -7.0
+        assert found.missing == np.isnan(found.z[10:21, 15:26]).sum() > 20
+        assert [r.split()[0] for r in found.remarks] == ["1", str(found.missing)]
 
 
 def test_a_picture_is_no_map(tmp_path: Path) -> None:

@@ -12,12 +12,13 @@ from micstools.shapes import height_maps
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("file", type=Path, help="Esri raster .asc, points .xyz, or GeoTIFF .tif, in metres")
+    add("file", type=Path, help="Esri raster .asc, points .xyz, or GeoTIFF .tif")
     add("--out", type=Path, required=True, help="map of heights to write, for &bed file")
     add("--fill", type=float, metavar="HEIGHT", help="where the file has none (NODATA) [m]")
     add("--nodata", type=float, action="append", default=[], metavar="HEIGHT", help="takes this "
         "height as missing, beside the file's own mark; --nodata=-9999 with a sign")  # fmt: skip
     add("--grid", type=float, metavar="SPACING", help="draw scattered points to a grid [m]")
+    add("--unit", help="m, cm, mm, ft or us-ft, of numbers whose unit the file does not tell")
     add("--window", metavar="X0,Y0,X1,Y1", help="keep this part, in the file's coordinates [m]")
     add("--origin", default="0,0,0", metavar="X,Y,Z", help="place of the file that becomes 0,0,0 "
         "of the tank [m]; --origin=-5,2,0 with a sign first")  # fmt: skip
@@ -40,7 +41,7 @@ def _bed(given: argparse.Namespace) -> int:
     if not given.scale > 0:
         raise BadRun(f"--scale {given.scale:g}: must be positive")
     window = given.window and _parts("--window", given.window, "X0,Y0,X1,Y1")
-    found = height_maps.load(given.file, given.grid, given.nodata)
+    found = height_maps.load(given.file, given.grid, given.nodata, given.unit)
     if window:
         found = height_maps.cut(found, (window[0], window[1]), (window[2], window[3]))
     height_maps.require_ground(found)

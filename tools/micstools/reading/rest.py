@@ -1,5 +1,5 @@
-"""When blocks come to rest: by the program's own rule, which ends a run with `stop_when_settled`, so
-that it depends neither on how often rows are written nor on where a run ends."""
+"""When blocks come to rest: by the program's own rule, that of `stop_when_settled`, which depends
+neither on how often rows are written nor on where a run ends."""
 
 from dataclasses import dataclass
 

@@ -1,8 +1,9 @@
-"""Measured ground as a map of heights for `&bed`: from Esri .asc, points in .xyz, and GeoTIFF.
+"""Measured ground as a map of heights for `&bed`: from Esri .asc, points in .xyz or .csv, GeoTIFF.
 
 A height belongs to the middle of its cell, so a map reaches half a cell less far than a raster.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from micstools.extras import need
 from micstools.reading.reader import BadRun
 from micstools.shapes.geometry import Array
 
@@ -23,6 +25,16 @@ OFF_GRID = 0.03
 """How far a point of a regular grid may lie aside, for rounded figures, over the spacing."""
 NARROW = 1e-7
 """Width of places on one line, over their length; rounding leaves less."""
+FAR = 3.0
+"""What lies farther than so many mean spacings from any point of a survey is a gap in it."""
+UNITS = {
+    1.0: ("m", "metre", "metres", "meter", "meters"),
+    0.01: ("cm", "centimetre", "centimeter"),
+    0.001: ("mm", "millimetre", "millimeter"),
+    0.3048: ("ft", "foot", "feet", "international foot"),
+    1200 / 3937: ("us-ft", "us survey foot", "us survey feet", "ftus", "usft", "us ft", "foot us"),
+}
+"""Metres in a unit of length, and its names."""
 _HEADER = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize",
            "dx", "dy", "nodata_value")  # fmt: skip
 
@@ -34,6 +46,7 @@ class HeightMap:
     first: tuple[float, float]  # the point of least x and y [m]
     spacing: tuple[float, float]  # in x and y, positive [m]
     z: Array  # (ny, nx), y rising [m]; nan where none is known
+    remarks: tuple[str, ...] = ()  # what was changed of the numbers of the file
 
     @property
     def missing(self) -> int:
@@ -47,27 +60,52 @@ class HeightMap:
         return x + (nx - 1) * dx, y + (ny - 1) * dy
 
 
-def load(path: Path, grid: float | None = None, marks: Sequence[float] = ()) -> HeightMap:
-    """The map of a file; `grid` [m] draws scattered points of an .xyz file to that spacing.
+def metres(path: Path, unit: str) -> float:
+    """One unit of length in metres."""
+    name = unit.strip().lower().replace("_", " ").rstrip(".")
+    for factor, names in UNITS.items():
+        if name in names:
+            return factor
+    known = ", ".join(names[0] for names in UNITS.values())
+    raise BadRun(f"{path}: the unit {unit!r} is none of {known}")
 
-    `marks` are heights that stand for a missing one, beside those of the file.
+
+def load(
+    path: Path,
+    grid: float | None = None,
+    marks: Sequence[float] = (),
+    unit: str | None = None,
+) -> HeightMap:
+    """The map of a file in metres; `grid` [m] draws scattered points of an .xyz file to that
+    spacing.
+
+    `marks` are heights that stand for a missing one, beside those of the file; `unit` is that of
+    the numbers whose unit the file does not tell.
     """
     readers: dict[str, Callable[[Path], HeightMap]] = {
-        ".asc": lambda p: _esri(p, marks),
-        ".xyz": lambda p: _points(p, grid, marks),
-        ".tif": lambda p: _geotiff(p, marks),
-        ".tiff": lambda p: _geotiff(p, marks),
+        ".asc": lambda p: _in_metres(p, _esri(p, marks), unit),
+        ".xyz": lambda p: _points(p, grid, marks, unit),
+        ".csv": lambda p: _points(p, grid, marks, unit),
+        ".tif": lambda p: _geotiff(p, marks, unit),
+        ".tiff": lambda p: _geotiff(p, marks, unit),
     }
     if path.suffix.lower() not in readers:
         raise BadRun(f"{path}: must end in one of {', '.join(readers)}")
-    if grid is not None and path.suffix.lower() != ".xyz":
-        raise BadRun(f"--grid {grid:g}: is for scattered points, in .xyz files")
+    if grid is not None and path.suffix.lower() not in (".xyz", ".csv"):
+        raise BadRun(f"--grid {grid:g}: is for scattered points, in .xyz and .csv files")
     found = readers[path.suffix.lower()](path)
     if min(found.z.shape) < 2:
         raise BadRun(f"{path}: a map of heights needs two points at least in x and y")
     if not np.isfinite(found.z).any():
         raise BadRun(f"{path}: holds no height")
     return found
+
+
+def _in_metres(path: Path, found: HeightMap, unit: str | None) -> HeightMap:
+    factor = metres(path, unit or "m")
+    if factor == 1:
+        return found
+    return replace(moved(found, (0, 0, 0), factor), remarks=(f"from {unit} to m",))
 
 
 def require_ground(found: HeightMap) -> None:
@@ -118,7 +156,7 @@ def cut(found: HeightMap, low: tuple[float, float], high: tuple[float, float]) -
             raise BadRun(f"--window: the map covers x {x} and y {y} m only")
         axes.append(slice(begin, end + 1))
         first.append(start + begin * step)
-    return HeightMap((first[0], first[1]), found.spacing, found.z[axes[1], axes[0]])
+    return replace(found, first=(first[0], first[1]), z=found.z[axes[1], axes[0]])
 
 
 def moved(found: HeightMap, origin: tuple[float, ...], scale: float) -> HeightMap:
@@ -128,6 +166,7 @@ def moved(found: HeightMap, origin: tuple[float, ...], scale: float) -> HeightMa
         (scale * (x - origin[0]), scale * (y - origin[1])),
         (scale * dx, scale * dy),
         scale * (found.z - origin[2]),
+        found.remarks,
     )
 
 
@@ -149,6 +188,7 @@ def report(found: HeightMap) -> str:
         ("y", f"{found.first[1]:.10g} to {found.last[1]:.10g} m"),
         ("heights", f"{found.z.min():.6g} to {found.z.max():.6g} m"),
     ]
+    rows += [("changed", remark) for remark in found.remarks]
     return "\n".join(f"{name:10}{text}" for name, text in rows)
 
 
@@ -205,12 +245,28 @@ def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
     return HeightMap((first[0], first[1]), (edges[0], edges[1]), z)
 
 
-def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap:
+def _units_of_names(path: Path, head: str, unit: str | None) -> Array:
+    """Metres in the unit of each column of `head`, as in `x [ft], y (ft), z_m`; of all where none
+    is told the given one."""
+    told = re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", head) or re.findall(
+        rf"(?i)\b[a-z]+_({'|'.join(re.escape(n) for names in UNITS.values() for n in names)})\b",
+        head,
+    )
+    if len(told) not in (0, 1, 3):
+        raise BadRun(f"{path}: tells the units of {len(told)} columns of three: {head.strip()}")
+    units = told * 3 if len(told) == 1 else told or [unit or "m"] * 3
+    return np.array([metres(path, name) for name in units])
+
+
+def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | None) -> HeightMap:
     """Points x, y, z in lines, parted by blanks, commas or semicolons; the first may be names."""
-    text = path.read_text("utf-8-sig", errors="replace").replace(",", " ").replace(";", " ")
-    rows = [line.split("#")[0].split() for line in text.splitlines()]
-    rows = [row for row in rows if row]
+    lines = path.read_text("utf-8-sig", errors="replace").splitlines()
+    rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in lines]
+    lines = [line for line, row in zip(lines, rows, strict=True) if row != [""]]
+    rows = [row for row in rows if row != [""]]
+    factors = _units_of_names(path, "", unit)
     if rows and not any(map(_is_number, rows[0])):
+        factors = _units_of_names(path, lines[0], unit)
         rows = rows[1:]
     if not rows or any(len(row) != 3 for row in rows):
         raise BadRun(f"{path}: must hold x, y and z in each line")
@@ -218,14 +274,21 @@ def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap
     if not np.isfinite(points[:, :2]).all():
         raise BadRun(f"{path}: a place is not a number")
     points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
+    points *= factors
+    remarks = ("from other units to m",) * bool((factors != 1).any())
     if grid is None:
         _require_width(path, points[:, :2])
-        return _regular(path, points)
+        return replace(_regular(path, points), remarks=remarks)
     known = points[np.isfinite(points[:, 2])]
     if not len(known):
         raise BadRun(f"{path}: holds no height")
     _require_width(path, known[:, :2])
-    return _drawn(path, known, grid)
+    places, at, times = np.unique(known[:, :2], axis=0, return_inverse=True, return_counts=True)
+    heights = np.bincount(at.ravel(), known[:, 2]) / times
+    if (times > 1).any():
+        remarks += (f"{int((times > 1).sum())} places sounded more than once: their mean",)
+    found = _drawn(path, np.column_stack([places, heights]), grid)
+    return replace(found, remarks=remarks + found.remarks)
 
 
 def _require_width(path: Path, places: Array) -> None:
@@ -280,7 +343,7 @@ def _regular(path: Path, points: Array) -> HeightMap:
 
 def _drawn(path: Path, points: Array, grid: float) -> HeightMap:
     """Heights on a grid, linear on the triangles between points (n, 3) with heights; nan outside of
-    them."""
+    them, and in gaps between them."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
 
     if not grid > 0:
@@ -295,57 +358,70 @@ def _drawn(path: Path, points: Array, grid: float) -> HeightMap:
     except (ValueError, RuntimeError) as error:
         raise BadRun(f"{path}: no triangles fit between the points") from error
     at = np.meshgrid(grid * np.arange(nx), grid * np.arange(ny))
-    z = LinearTriInterpolator(triangles, points[:, 2])(*at)
-    return HeightMap((float(low[0]), float(low[1])), (grid, grid), z.filled(np.nan))
+    z = LinearTriInterpolator(triangles, points[:, 2])(*at).filled(np.nan)
+    inside = np.asarray(triangles.get_trifinder()(*at), dtype=np.int64)
+    corner = (points[:, :2] - low)[triangles.triangles[inside]]  # (ny, nx, 3, 2)
+    away = np.linalg.norm(corner - np.stack(at, axis=-1)[:, :, None], axis=3).min(axis=2)
+    far = FAR * float(np.sqrt(np.ptp(x) * np.ptp(y) / len(points)))
+    gap = (inside >= 0) & (away > far)
+    z[gap] = np.nan
+    said = f"{int(gap.sum())} points of the grid lie farther than {far:.3g} m from any sounding"
+    remarks = (said,) if gap.any() else ()
+    return HeightMap((float(low[0]), float(low[1])), (grid, grid), z, remarks)
 
 
-def _geotiff(path: Path, marks: Sequence[float]) -> HeightMap:
-    """A GeoTIFF with one band of integers or single precision, in metres; Pillow unpacks it, its
-    tags tell where it lies."""
-    from PIL import Image
+def _geotiff(path: Path, marks: Sequence[float], unit: str | None) -> HeightMap:
+    """A GeoTIFF with one band of heights: its units, scale, offset, mark and place are its own."""
+    need("survey")
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
     try:
         with (
-            warnings.catch_warnings(action="ignore"),
-            Image.open(path, formats=["TIFF"]) as image,
+            warnings.catch_warnings(action="ignore", category=NotGeoreferencedWarning),
+            rasterio.open(path, driver="GTiff") as raster,
         ):
-            if image.mode not in ("F", "I", "L") and not image.mode.startswith("I;16"):
+            if raster.count != 1 or np.issubdtype(raster.dtypes[0], np.complexfloating):
                 raise BadRun(f"{path}: holds colours, not heights")
-            tags = {int(key): image.tag_v2[key] for key in image.tag_v2}  # type: ignore[attr-defined]
-            z = np.asarray(image).astype(float)
-    except (Image.DecompressionBombError, SyntaxError, ValueError, OSError) as error:
-        if isinstance(error, FileNotFoundError):
-            raise
-        raise BadRun(
-            f"{path}: cannot be read ({error}); gdal_translate -ot Float32 makes one that can"
-        ) from error
-    corner, step = _place(path, tags)
-    mark = tags.get(42113)
-    own = MARKS if mark is None else (_number(path, str(mark).strip("\0 ")),)
-    z = _without_marks(z, [*own, *marks])
-    if step[1] < 0:  # rows come from the north, as a rule
-        z, corner[1], step[1] = z[::-1], corner[1] + (len(z) - 1) * step[1], -step[1]
-    return HeightMap((corner[0], corner[1]), (step[0], step[1]), z)
-
-
-def _place(path: Path, tags: dict[int, tuple[float, ...]]) -> tuple[list[float], list[float]]:
-    """Middle of the first pixel, and the step from one to the next."""
-    keys = tags.get(34735, ())
-    known = {keys[k]: keys[k + 3] for k in range(4, len(keys) - 3, 4) if keys[k + 1] == 0}
-    if known.get(1024) == 2:
-        raise BadRun(f"{path}: lies in degrees; gdalwarp -t_srs makes one in metres of it")
-    middle = 0.0 if known.get(1025) == 2 else 0.5  # pixels are points, or areas
-    if 34264 in tags:
-        m = tags[34264]
-        if m[1] or m[4]:
-            raise BadRun(f"{path}: is turned; gdalwarp makes one along x and y of it")
-        step, corner = [m[0], m[5]], [m[3], m[7]]
-    elif 33550 in tags and len(tags.get(33922, ())) == 6:
-        (sx, sy), (i, j, _, x, y, _) = tags[33550][:2], tags[33922]
-        step = [sx, -sy]
-        corner = [x - i * step[0], y - j * step[1]]
-    else:
+            z = raster.read(1).astype(float)
+            (a, b, c, d, e, f), crs, mark = raster.transform[:6], raster.crs, raster.nodata
+            scale, offset, told = raster.scales[0], raster.offsets[0], raster.units[0]
+    except RasterioError as error:
+        if not path.exists():
+            raise FileNotFoundError(path) from error
+        raise BadRun(f"{path}: cannot be read ({error}); gdal_translate may mend it") from error
+    if (a, b, c, d, e, f) == (1, 0, 0, 0, 1, 0):
         raise BadRun(f"{path}: does not tell where it lies, it is no GeoTIFF")
-    if not step[0] > 0 or not step[1]:
+    if crs is not None and crs.is_geographic:
+        raise BadRun(f"{path}: lies in degrees; gdalwarp -t_srs makes one in metres of it")
+    if b or d:
+        raise BadRun(f"{path}: is turned; gdalwarp makes one along x and y of it")
+    if a <= 0 or not e:
         raise BadRun(f"{path}: its columns do not run to the east")
-    return [c + middle * s for c, s in zip(corner, step, strict=True)], step
+    z = offset + scale * _without_marks(z, [*(MARKS if mark is None else (mark,)), *marks])
+    ground = crs.linear_units if crs is not None and crs.is_projected else _unit_key(path)
+    along = metres(path, ground)
+    if not (told or unit) and along != 1:
+        raise BadRun(f"{path}: lies in {ground} and does not tell the unit of its heights: give "
+                     "--unit")  # fmt: skip
+    x, y = along * (c + a / 2), along * (f + e / 2)
+    step = [along * a, along * e]
+    z *= metres(path, told or unit or "m")
+    if step[1] < 0:  # rows come from the north, as a rule
+        z, y, step[1] = z[::-1], y + (len(z) - 1) * step[1], -step[1]
+    remarks = [f"heights times {scale:g} plus {offset:g}"] * ((scale, offset) != (1, 0))
+    remarks += [f"from {ground} to m"] * (along != 1)
+    remarks += [f"heights from {told or unit} to m"] * (metres(path, told or unit or "m") != 1)
+    return HeightMap((x, y), (step[0], step[1]), z, tuple(remarks))
+
+
+def _unit_key(path: Path) -> str:
+    """The unit of a GeoTIFF whose system has no other name: its key 3076, which GDAL passes over
+    then."""
+    from PIL import Image
+
+    with Image.open(path, formats=["TIFF"]) as image:
+        keys = image.tag_v2.get(34735, ())  # type: ignore[attr-defined]
+    known = {keys[k]: keys[k + 3] for k in range(4, len(keys) - 3, 4)}
+    code = known.get(3076, 9001)
+    return {9001: "m", 9002: "foot", 9003: "US survey foot"}.get(code, f"EPSG:{code}")
