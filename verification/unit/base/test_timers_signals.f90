@@ -32,14 +32,15 @@ contains
   end subroutine test_timers_signals
 
   subroutine test_timers()
-    integer :: outer, inner, i
+    integer :: outer, inner, i, others   ! timers of other tests in this program
     real(wp) :: began
 
     began = wall_clock()
+    others = timer_count()
     outer = timer('outer')
     inner = timer('inner')
     call check('same name, same timer', timer('outer'), outer)
-    call check('two timers', timer_count(), 2)
+    call check('two timers', timer_count() - others, 2)
     call tic(outer)
     do i = 1, 3
       call tic(inner)
