@@ -29,11 +29,11 @@ contains
         record%hardest(b) = max(record%hardest(b), norm(blocks%contact_force(:, b)))
         if (blocks%fixed(b)) cycle
         if (blocks%speed(b) >= rest_speed) then
-          record%rest_since(b) = -1.0_wp
-        else if (record%rest_since(b) < 0.0_wp) then
+          record%rest_since(b) = 0.0_wp
+        else if (record%rest_since(b) <= 0.0_wp) then
           record%rest_since(b) = time
         end if
-        if (record%impact_speed(b) >= 0.0_wp) cycle
+        if (record%impact_speed(b) > 0.0_wp) cycle
         v = norm(blocks%v_start(:, b))
         associate (way => record%approach(1, b), now => record%approach(2, b), &
                    before => record%approach(3, b))

@@ -40,8 +40,8 @@ module rigid_body_m
   !> What the results keep of the blocks between rows (`block_record_m`).
   type :: record_t
     real(wp), allocatable :: hardest(:)        !! (n) largest contact force since the last row [N]
-    real(wp), allocatable :: impact_speed(:)   !! (n) before the first touch, < 0: none yet [m/s]
-    real(wp), allocatable :: rest_since(:)     !! (n) [s], < 0: it moves
+    real(wp), allocatable :: impact_speed(:)   !! (n) before the first touch, 0: none yet [m/s]
+    real(wp), allocatable :: rest_since(:)     !! (n) [s], 0: it moves
     real(wp), allocatable :: approach(:, :)
       !! (3, n) way in this part of it [m], largest speed in it and in the one before [m/s]
   end type record_t
@@ -63,7 +63,7 @@ module rigid_body_m
     logical, allocatable :: still(:)             !! (n) asleep, or held at rest for ever
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
     real(wp), allocatable :: entry_time(:)       !! (n) likewise of coming into the tank [s]
-    real(wp), allocatable :: exit_time(:)        !! (n) when it was found out, < 0: never [s]
+    real(wp), allocatable :: exit_time(:)        !! (n) when it was found out, 0: never [s]
     real(wp), allocatable :: raised(:)           !! (n) above its place when that was taken [m]
     real(wp), allocatable :: planned(:, :)       !! (2, n) x, y without the random shift [m]
     character(name_length), allocatable :: name(:)   !! (n) of the unit in a plan; '': none
@@ -118,7 +118,7 @@ contains
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
       blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
     allocate (blocks%exit_time(n), blocks%record%impact_speed(n), blocks%record%rest_since(n), &
-      source=-1.0_wp)
+      source=0.0_wp)
     allocate (blocks%record%hardest(n), source=0.0_wp)
     allocate (blocks%record%approach(3, n), source=0.0_wp)
     allocate (blocks%name(n), blocks%handling(n))

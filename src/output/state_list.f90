@@ -33,7 +33,7 @@ module state_list_m
   type :: state_list_t
     type(grid_t), pointer :: grid => null()
     integer :: n = 0
-    type(item_t) :: item(max_items)
+    type(item_t), allocatable :: item(:)   !! (`max_items`), not on the stack
   contains
     procedure, private :: add_scalar_field, add_vector_field, add_number, add_reals, add_matrix
     procedure, private :: add_whole_number, add_integers, add_logicals, begin
@@ -131,6 +131,7 @@ contains
     character(*), intent(in) :: name, units
     integer, intent(in) :: kind, extent(:)
 
+    if (.not. allocated(self%item)) allocate (self%item(max_items))
     if (self%n == max_items) error stop 'state_list: max_items is too small'
     self%n = self%n + 1
     associate (item => self%item(self%n))

@@ -211,10 +211,10 @@ def _write_bodies(
 
 
 def _still_since(time: Array, place: Array) -> float:
-    """From when on a block stays where it ends; -1: it moves to the end."""
+    """From when on a block stays where it ends; 0: it moves to the end."""
     far = np.flatnonzero(np.linalg.norm(place - place[-1], axis=1) > 1e-3 * np.ptp(place) + 1e-9)
     first = far[-1] + 1 if far.size else 0
-    return float(time[first]) if first < len(time) - 1 else -1.0
+    return max(float(time[first]), 1e-3) if first < len(time) - 1 else 0.0
 
 
 def _write_series(group: h5py.Group, time: Array, drops: int) -> None:

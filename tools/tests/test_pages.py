@@ -14,7 +14,7 @@ PAGES += sorted(str(page.relative_to(ROOT)) for page in ROOT.glob("verification/
 FOLDERS = ("src", "docs", "tools", "input", "verification")
 
 # A path from the top, as `src/grid/grid.f90`, or, for Fortran, from src, as `grid/grid.f90`.
-FROM_TOP = re.compile(rf"(?<![\w/.-])(?:{'|'.join(FOLDERS)})/[\w./*-]*\w")
+FROM_TOP = re.compile(rf"(?<![\w/.:-])(?:{'|'.join(FOLDERS)})/[\w./*-]*\w")
 FROM_SRC = re.compile(rf"(?<![\w/.-])(?:{'|'.join(sorted(HEIGHT.keys() - {TOP}))})/[\w*]+\.f90")
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
 WORDS = {

@@ -61,7 +61,8 @@ def disturb(way: str, folder: Path, kept: Path) -> None:
 def begun(folder: Path, work: Path, way: str) -> bool:
     """Has the second run its files, or what there is of the first?"""
     if way == "unseen in place":
-        return (folder / LOCK).read_text().endswith("elsewhere")
+        lock = folder / LOCK  # gone once the first run has ended
+        return lock.exists() and lock.read_text().endswith("elsewhere")
     if way == "unseen" and not (work / "run.bak-1").exists():
         return False
     return all((folder / name).exists() for name in RESULTS)

@@ -508,13 +508,13 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
 
 
 _KEPT = ("impact_speed", "rest_since")
-"""Numbers of each body that the program keeps."""
+"""Numbers of each body that the program keeps; 0: there is none yet."""
 
 
 def _kept(group: h5py.Group, name: str, n: int) -> Array:
-    """One of them; nan where it is negative, and in results of older programs."""
-    found = numbers(group, name, n) if name in group else np.full(n, -1.0)
-    return np.where(found < 0, np.nan, found)
+    """One of them; nan where it is 0, and in results of older programs."""
+    found = numbers(group, name, n) if name in group else np.zeros(n)
+    return np.where(found <= 0, np.nan, found)
 
 
 _HANDLED = ("release_time", "entry_time", "exit_time", "raised", "status")
