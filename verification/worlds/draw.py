@@ -218,7 +218,7 @@ def world(
     dt = draw(number(0.05, 0.4)) * sqrt(min(cell) / GRAVITY)
     steps = draw(st.integers(4, 24))
     run = {"physics": physics, "t_end": steps * dt, "dt": dt, "field_interval": 0.0,
-           "restart_interval": 0.0}  # fmt: skip
+           "restart_interval": 0.0, "rest_speed": 1e-3 * sqrt(GRAVITY * across)}  # fmt: skip
     groups: list[tuple[str, Group]] = [
         ("run", run),
         ("grid", {"cells": cells, "length": length}),
