@@ -17,7 +17,6 @@ module contact_forces_m
   type :: loads_t
     real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
-    real(wp), allocatable :: film(:, :)          !! of films of liquid, with impulses [N]
   end type loads_t
 
   !> What happened in the substeps of one fluid step.

@@ -5,24 +5,24 @@
 !! others falls in one step.
 module impulse_step_m
   use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
   use vectors_m, only: cross, distance, norm
   use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body, haste, change_by_motion
   use walls_m, only: walls_t
-  use bed_m, only: bed_is_near, bed_place
+  use bed_m, only: bed_counterpart, bed_is_near, bed_place
   use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
   use counterparts_m, only: update_motion, update_inertia
   use contact_forces_m, only: contact_report_t
-  use contact_state_m, only: contacts_t
+  use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
   use substep_limits_m, only: equal_substep
-  use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
+  use impulse_rows_m, only: rows_t, rows_init, make_rows, store_memory, sum_loads
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
-  use acting_bodies_m, only: list_present
+  use contact_detection_m, only: list_bodies
   use resting_m, only: hold_or_wake, restore_contacts
-  use counterparts_met_m, only: store_counterparts
   implicit none
   private
-  public :: move_by_impulses
+  public :: impulses_t
 
   integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
   integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
@@ -34,17 +34,49 @@ module impulse_step_m
   real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
   real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
+  type, extends(contact_solver_t) :: impulses_t
+    type(rows_t) :: rows
+    real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films of liquid [N]
+    real(wp), allocatable :: gain(:)         !! (n) work: speed gained in free fall [m/s]
+    real(wp) :: contact_time = 0.0_wp        !! [s]
+    real(wp) :: restitution = 0.0_wp         !! [-]
+    real(wp) :: smallest_edge = 0.0_wp       !! of all blocks [m]
+  contains
+    procedure, pass(contacts) :: init
+    procedure, pass(contacts) :: advance => move_by_impulses
+  end type impulses_t
+
 contains
+
+  subroutine init(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    class(impulses_t), intent(inout) :: contacts
+    integer :: b
+
+    call start_solver(input, blocks, contacts)
+    contacts%warm_start = .true.
+    call rows_init(blocks%n, contacts%rows)
+    allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
+    contacts%contact_time = input%contact_time
+    contacts%restitution = input%restitution
+    contacts%smallest_edge = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
+    associate (search => contacts%detected%surface%search)
+      search%lasting = 2*input%contact_time   ! lists of fast bodies: two steps
+      search%lasting_gaps = 1.0_wp
+    end associate
+  end subroutine init
 
   !> Move the blocks through a fluid step; impulses of contact are added to the loads of the step.
   subroutine move_by_impulses(walls, gravity, dt, contacts, blocks, report)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! fluid step [s]
-    type(contacts_t), intent(inout) :: contacts
+    class(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
     real(wp) :: left, longest, step, h
+    logical :: woke
     integer :: n
 
     left = dt
@@ -60,8 +92,8 @@ contains
       do
         call solve_step(walls, gravity, step, h, n, contacts, blocks)
         if (.not. contacts%sleep%active) exit
-        call hold_or_wake(gravity, contacts, blocks)
-        if (.not. any(contacts%woken)) exit
+        call hold_or_wake(gravity, contacts, blocks, woke)
+        if (.not. woke) exit
         call restore_contacts(blocks, contacts)   ! what wakes takes part: once more
       end do
       call finish_step(gravity, step, h, contacts, blocks, report)
@@ -78,7 +110,7 @@ contains
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: left         !! of the fluid step [s]
-    type(contacts_t), intent(inout) :: contacts
+    type(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(out) :: longest
     real(wp) :: speed, most, two(2), edge
@@ -158,7 +190,7 @@ contains
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: step, h      !! of n sub-sweeps [s]
     integer, intent(in) :: n
-    type(contacts_t), intent(inout) :: contacts
+    type(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp) :: by_film(3)
     integer :: k
@@ -166,14 +198,14 @@ contains
     associate (detected => contacts%detected, rows => contacts%rows, loads => contacts%loads)
       detected%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
       call find_surface_points(walls, blocks, step, detected%surface, detected%points)
-      call list_present(blocks, detected%acting)
+      call list_bodies(blocks%present, detected%acting)
       associate (there => detected%acting%body(:detected%acting%n))
         call update_motion(blocks, there, detected%counterparts)
         call update_inertia(blocks, there, detected%counterparts)
       end associate
-      loads%film = 0.0_wp
+      contacts%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
-        contacts%lubrication, loads%film)
+        contacts%lubrication, contacts%film)
       call make_rows(h, contacts%contact_time, detected, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
         ! Accelerations of all bodies with rows but for contact, at the start of the step. An impact
@@ -185,7 +217,7 @@ contains
               if (blocks%path(b)%n > 0) rows%a_free(:, b) = change_by_motion(blocks, b, step)/step
             end if
             if (rows%inverse_mass(b) <= 0.0_wp) cycle
-            by_film = rows%inverse_mass(b)*contacts%loads%film(:, b)
+            by_film = rows%inverse_mass(b)*contacts%film(:, b)
             rows%v_start(1:3, b) = rows%v_start(1:3, b) + step*by_film
             rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
             rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), &
@@ -196,7 +228,7 @@ contains
         call restore(contacts%restitution, slow_hit*norm(gravity)*step, rows)
       end if
       call sum_loads(step, rows, loads%force, loads%torque)
-      loads%force = loads%force + loads%film
+      loads%force = loads%force + contacts%film
     end associate
   end subroutine solve_step
 
@@ -204,7 +236,7 @@ contains
   subroutine finish_step(gravity, step, h, contacts, blocks, report)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: step, h      !! [s]
-    type(contacts_t), intent(inout) :: contacts
+    type(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
     real(wp) :: force(3)
@@ -219,7 +251,7 @@ contains
           call place_body(b, rows%way(:, b), rows%v(1:3, b), &
             step*(blocks%fluid_torque(:, b) + loads%torque(:, b)), blocks)
         else
-          force = contacts%steady(:, b) + contacts%share(b)*loads%film(:, b)
+          force = contacts%steady(:, b) + contacts%share(b)*contacts%film(:, b)
           call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)
           call drift_body(step, b, blocks)
           call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)

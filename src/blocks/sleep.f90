@@ -33,11 +33,9 @@ module sleep_m
     real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
-    type(displacements_t) :: rest              !! contact points at rest, between what does not move
+    type(displacements_t) :: frozen            !! contact points between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
-    logical, allocatable :: candidate(:), supported(:), chosen(:)
-      !! (n), (n), (displacements) work
   end type sleep_t
 
 contains
@@ -51,9 +49,8 @@ contains
     sleep%active = active
     sleep%bounding_radius = radius
     allocate (sleep%quiet(size(radius)), source=0.0_wp)
-    allocate (sleep%candidate(size(radius)), sleep%supported(size(radius)), source=.false.)
     allocate (sleep%load(3, size(radius)), sleep%load_torque(3, size(radius)), source=0.0_wp)
-    call reserve_displacements(1, sleep%rest)
+    call reserve_displacements(1, sleep%frozen)
   end subroutine sleep_init
 
   !> Which bodies do not move: sleepers, and fixed ones without a given velocity that no path moves
@@ -91,7 +88,7 @@ contains
 
     sleep%load = 0.0_wp
     sleep%load_torque = 0.0_wp
-    call sum_memory(sleep%rest, sleep%load, sleep%load_torque)
+    call sum_memory(sleep%frozen, sleep%load, sleep%load_torque)
   end subroutine update_loads
 
   !> Add the forces and torques on bodies of contact points that remember them.

@@ -1,7 +1,7 @@
 !> How long a substep of contact may be.
 module substep_limits_m
   use kinds_m, only: wp
-  use case_types_m, only: contact_input_t, is_given
+  use case_types_m, only: contact_input_t
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t, haste
   use walls_m, only: walls_t
@@ -11,39 +11,16 @@ module substep_limits_m
   use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
-  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_substep
+  public :: limits_t, longest_substep_of, substep_limit, stiffness_limit, equal_substep
 
+  !> The limits of a case.
   type :: limits_t
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
     real(wp) :: longest_substep = 0.0_wp         !! [s]
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
-    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
-    real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
-    real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
   end type limits_t
 
 contains
-
-  !> The limits of a case.
-  pure subroutine limits_init(input, detected, limits)
-    type(contact_input_t), intent(in) :: input
-    type(contact_detection_t), intent(in) :: detected
-    type(limits_t), intent(out) :: limits
-
-    limits%substep_ratio = 1.0_wp
-    if (is_given(input%substep_ratio)) limits%substep_ratio = input%substep_ratio
-    limits%longest_substep = longest_substep_of(input)
-    limits%courant_max = input%courant_max
-    if (detected%exact) then
-      limits%bounding_radius = detected%surface%bounding_radius
-      limits%smallest = detected%surface%smallest
-      limits%clear = detected%surface%clear
-    else
-      limits%bounding_radius = detected%spheres%bounding_radius
-      limits%smallest = detected%spheres%smallest
-      limits%clear = detected%spheres%clear
-    end if
-  end subroutine limits_init
 
   !> Longest substep at all: a twentieth of the contact time [s].
   pure function longest_substep_of(input) result(longest)
@@ -70,33 +47,35 @@ contains
 
     limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(detected))
     if (detected%exact) then
-      near = fastest_near(blocks, limits, detected%surface%near)
+      near = fastest_near(blocks, detected, detected%surface%near)
     else
-      near = fastest_near(blocks, limits, detected%spheres%near)
+      near = fastest_near(blocks, detected, detected%spheres%near)
     end if
     fastest = 0.0_wp
-    do b = 1, blocks%n
-      if (.not. blocks%present(b) .or. blocks%still(b)) cycle
-      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%bounding_radius(b) &
-        + haste(blocks, b, limits%bounding_radius(b))
-      if (.not. speed <= fastest(2)) fastest(2) = speed
-      if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
-      if (.not. speed <= near) then
-        if (near_wall(walls, blocks%x(:, b), limits%bounding_radius(b) + limits%clear)) near = speed
-      end if
-    end do
-    if (.not. near*limit <= limits%courant_max*limits%smallest) then
-      limit = limits%courant_max*limits%smallest/near
+    associate (radius => detected%bounding_radius)
+      do b = 1, blocks%n
+        if (.not. blocks%present(b) .or. blocks%still(b)) cycle
+        speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*radius(b) &
+          + haste(blocks, b, radius(b))
+        if (.not. speed <= fastest(2)) fastest(2) = speed
+        if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
+        if (.not. speed <= near) then
+          if (near_wall(walls, blocks%x(:, b), radius(b) + detected%clear)) near = speed
+        end if
+      end do
+    end associate
+    if (.not. near*limit <= limits%courant_max*detected%smallest) then
+      limit = limits%courant_max*detected%smallest/near
     end if
     speed = sum(fastest)
-    if (.not. speed*limit <= limits%clear) limit = limits%clear/speed
+    if (.not. speed*limit <= detected%clear) limit = detected%clear/speed
   end function substep_limit
 
   !> Highest relative speed of any two points of pairs of bodies that are near now [m/s]. The list
   !! holds more pairs, the more the longer it stands.
-  pure function fastest_near(blocks, limits, near) result(fastest)
+  pure function fastest_near(blocks, detected, near) result(fastest)
     type(blocks_t), intent(in) :: blocks
-    type(limits_t), intent(in) :: limits
+    type(contact_detection_t), intent(in) :: detected
     type(pair_list_t), intent(in) :: near
     real(wp) :: fastest
     real(wp) :: speed
@@ -104,10 +83,10 @@ contains
 
     fastest = 0.0_wp
     do p = 1, near%n
-      associate (a => near%a(p), b => near%b(p), radius => limits%bounding_radius)
+      associate (a => near%a(p), b => near%b(p), radius => detected%bounding_radius)
         if (blocks%still(a) .and. blocks%still(b)) cycle
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
-            > radius(a) + radius(b) + limits%clear) cycle
+            > radius(a) + radius(b) + detected%clear) cycle
         speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*radius(a) &
           + norm(blocks%omega(:, b))*radius(b) + haste(blocks, a, radius(a)) &
           + haste(blocks, b, radius(b))

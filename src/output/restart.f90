@@ -149,7 +149,7 @@ contains
       call file%read('/contacts/rest_n', n(2:2))
       where (n < 0 .or. n > max_displacements) n = 0   ! a damaged file: its checksum shows it
       state%contacts%displacements%n = n(1)
-      state%contacts%sleep%rest%n = n(2)
+      state%contacts%sleep%frozen%n = n(2)
       call list_state(state, list)
       do i = 1, list%n
         call read_item(list%grid, list%item(i), file)

@@ -4,7 +4,7 @@ module run_state_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
-  use contacts_m, only: contacts_t
+  use contacts_m, only: contact_solver_t
   use light_m, only: light_t
   use clock_m, only: clock_t
   use energy_m, only: energy_t
@@ -18,7 +18,7 @@ module run_state_m
     type(flow_t) :: flow   !! arrays not allocated in a dry run
     type(solid_geometry_t), allocatable :: solid   !! likewise
     type(blocks_t) :: blocks
-    type(contacts_t) :: contacts
+    class(contact_solver_t), allocatable :: contacts
     type(light_t) :: light
     type(energy_t) :: energy
   end type run_state_t

@@ -51,10 +51,10 @@ contains
       call list%add('/light/wet', 'm3', state%light%wet)
       call list%add('/light/force', 'N, N m', state%light%force)
     end if
-    associate (contacts => state%contacts, impulses => state%contacts%by_impulses)
-      call list_displacements('/contacts/', impulses, impulses, contacts%displacements, list)
+    associate (contacts => state%contacts, warm => state%contacts%warm_start)
+      call list_displacements('/contacts/', warm, warm, contacts%displacements, list)
       call list%add('/contacts/quiet', 's', contacts%sleep%quiet)
-      call list_displacements('/contacts/rest_', .true., impulses, contacts%sleep%rest, list)
+      call list_displacements('/contacts/rest_', .true., warm, contacts%sleep%frozen, list)
     end associate
   end subroutine list_state
 

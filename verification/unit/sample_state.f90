@@ -8,7 +8,7 @@ module sample_state_m
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_init
-  use contacts_m, only: contacts_t, contacts_init
+  use contacts_m, only: contact_solver_t, contacts_init
   use displacements_m, only: displacements_t
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
@@ -102,12 +102,12 @@ contains
 
   subroutine make_displacements(start, contacts)
     real(wp), intent(in) :: start
-    type(contacts_t), intent(inout) :: contacts
+    class(contact_solver_t), intent(inout) :: contacts
 
     call fill_displacements(start, contacts%displacements)
     contacts%displacements%n = 4
-    call fill_displacements(2*start, contacts%sleep%rest)
-    contacts%sleep%rest%n = 3
+    call fill_displacements(2*start, contacts%sleep%frozen)
+    contacts%sleep%frozen%n = 3
     contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
   end subroutine make_displacements
 

@@ -6,12 +6,10 @@ module test_contact_forces_m
   use random_counter_m, only: uniform
   use vectors_m, only: cross
   use bed_m, only: bed_counterpart
-  use contact_points_m, only: contact_point_t, add_point
-  use contact_groups_m, only: form_groups
+  use contact_points_m, only: contact_point_t, add_point, form_groups
   use displacements_m, only: displacements_t, reserve_displacements
   use contact_laws_m, only: choose_law
   use contact_response_m, only: respond
-  use acting_bodies_m, only: acting_init
   use contact_detection_m, only: contact_detection_t
   use contact_forces_m, only: loads_t, contact_report_t, match_displacements, &
     integrate_displacements, sum_forces, elastic_energy
@@ -85,7 +83,6 @@ contains
 
     call reserve_displacements(1, displacements)
     call reserve_displacements(1, before)
-    call acting_init(3, detected%acting)
     detected%acting%n = 3
     detected%acting%body = [1, 2, 3]
     detected%points%n = 0

@@ -508,14 +508,14 @@ contains
       call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
       two%contacts%displacements = one%contacts%displacements
       two%contacts%sleep%quiet = one%contacts%sleep%quiet
-      two%contacts%sleep%rest = one%contacts%sleep%rest
+      two%contacts%sleep%frozen = one%contacts%sleep%frozen
       if (n == 1) then
         call release_body(0.4_wp, 6, one%blocks)
         call release_body(0.4_wp, 6, two%blocks)
       end if
     end do
     two%contacts%displacements%xi = 0.0_wp
-    two%contacts%sleep%rest%force = 0.0_wp   ! where they sleep
+    two%contacts%sleep%frozen%force = 0.0_wp   ! where they sleep
     call move(one, 1, dt)
     call move(two, 1, dt)
     call check('the displacements matter', .not. same(one%blocks, two%blocks))

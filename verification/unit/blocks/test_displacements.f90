@@ -3,11 +3,11 @@
 module test_displacements_m
   use kinds_m, only: wp
   use check_m, only: check
-  use contact_points_m, only: contact_point_t, contact_points_t, add_point, set_apart
-  use contact_groups_m, only: groups_t, form_groups
+  use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, set_apart, &
+    form_groups
   use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &
     move_displacements
-  use counterparts_met_m, only: met_t, store_counterparts
+  use contact_solver_m, only: met_t, store_counterparts
   implicit none
   private
   public :: test_displacements

@@ -125,10 +125,10 @@ contains
     energy = 0.5_wp*load**2/k_n
     call start_step(world)
     associate (contacts => world%contacts, blocks => world%blocks)
-      call check('at rest', all([contacts%displacements%n, contacts%sleep%rest%n] == [0, 1]))
-      call check('its force', contacts%sleep%rest%force(:, 1), [0.0_wp, 0.0_wp, load], &
+      call check('at rest', all([contacts%displacements%n, contacts%sleep%frozen%n] == [0, 1]))
+      call check('its force', contacts%sleep%frozen%force(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
-      call check('its energy', contacts%sleep%rest%energy(1), energy, 1.0e-9_wp*energy)
+      call check('its energy', contacts%sleep%frozen%energy(1), energy, 1.0e-9_wp*energy)
       call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
       call check('no more contact points', contacts%detected%points%n, 0)
@@ -139,7 +139,8 @@ contains
         1.0e-12_wp*blocks%mass(1)*slow)
       contacts%steady(1, 1) = 0.1_wp*load
       call start_step(world)
-      call check('at work again', all([contacts%displacements%n, contacts%sleep%rest%n] == [1, 0]))
+      call check('at work again', all([contacts%displacements%n, contacts%sleep%frozen%n] &
+        == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp, 0.0_wp)
       call check('touches again', contacts%detected%points%n, 1)
     end associate

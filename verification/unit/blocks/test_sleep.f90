@@ -109,13 +109,13 @@ contains
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
 
     call sleep_init(.true., [1.0_wp, 1.0_wp, 1.0_wp], sleep)
-    call reserve_displacements(3, sleep%rest)
-    sleep%rest%n = 3
-    sleep%rest%a(:3) = [1, 2, 3]
-    sleep%rest%b(:3) = [-5, 1, 1]
-    sleep%rest%force(:, :3) = reshape([5*x, 2*x, 3*x], [3, 3])
-    sleep%rest%torque_a(:, :3) = reshape([7*x, 20*x, 30*x], [3, 3])
-    sleep%rest%torque_b(:, :3) = reshape([1000*x, 100*x, 300*x], [3, 3])
+    call reserve_displacements(3, sleep%frozen)
+    sleep%frozen%n = 3
+    sleep%frozen%a(:3) = [1, 2, 3]
+    sleep%frozen%b(:3) = [-5, 1, 1]
+    sleep%frozen%force(:, :3) = reshape([5*x, 2*x, 3*x], [3, 3])
+    sleep%frozen%torque_a(:, :3) = reshape([7*x, 20*x, 30*x], [3, 3])
+    sleep%frozen%torque_b(:, :3) = reshape([1000*x, 100*x, 300*x], [3, 3])
     call update_loads(sleep)
     call check('forces at rest', sleep%load(1, :), [5.0_wp - 2 - 3, 2.0_wp, 3.0_wp], 0.0_wp)
     call check('torques at rest', sleep%load_torque(1, :), [407.0_wp, 20.0_wp, 30.0_wp], 0.0_wp)

@@ -41,12 +41,10 @@ contains
     blocks%x(3, :) = [0.1_wp, 5.0_wp]
     walls%n = 1
     walls%normal(3, 1) = -1.0_wp
-    limits%substep_ratio = 0.5_wp
-    limits%longest_substep = 0.01_wp
-    limits%courant_max = 0.1_wp
-    limits%bounding_radius = [0.1_wp, 0.1_wp]
-    limits%smallest = 0.02_wp
-    limits%clear = 0.05_wp
+    limits = limits_t(0.5_wp, 0.01_wp, 0.1_wp)
+    detected%bounding_radius = [0.1_wp, 0.1_wp]
+    detected%smallest = 0.02_wp
+    detected%clear = 0.05_wp
     call check('a share of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), &
       0.005_wp, 0.0_wp)
     call check('of the contact time', substep_limit(walls, detected, blocks, 1.0_wp, limits), &

@@ -91,9 +91,9 @@ contains
     case (28); name = '/contacts/key'; s%contacts%displacements%id(4) = 11
     case (29); name = '/contacts/stretch'; call touch(s%contacts%displacements%xi(3, 4))
     case (30); name = '/contacts/quiet'; call touch(s%contacts%sleep%quiet(1))
-    case (31); name = '/contacts/rest_stretch'; call touch(s%contacts%sleep%rest%xi(2, 3))
-    case (32); name = '/contacts/rest_torque_b'; call touch(s%contacts%sleep%rest%torque_b(1, 1))
-    case (33); name = '/contacts/rest_energy'; call touch(s%contacts%sleep%rest%energy(3))
+    case (31); name = '/contacts/rest_stretch'; call touch(s%contacts%sleep%frozen%xi(2, 3))
+    case (32); name = '/contacts/rest_torque_b'; call touch(s%contacts%sleep%frozen%torque_b(1, 1))
+    case (33); name = '/contacts/rest_energy'; call touch(s%contacts%sleep%frozen%energy(3))
     case (34); name = '/blocks/asleep'; s%blocks%asleep(2) = .not. s%blocks%asleep(2)
     case default; name = '/contacts/stiffness'; call touch(s%contacts%displacements%k(1))
     end select

@@ -1,0 +1,179 @@
+!> What every solver of contact has: what touches, what is remembered of it, who sleeps, and what
+!! contact has done to the bodies in a step.
+module contact_solver_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_capacity
+  use case_types_m, only: contact_input_t
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t, floor_wall
+  use bed_m, only: bed_counterpart
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before
+  use sleep_m, only: sleep_t, sleep_init, sum_memory
+  use lubrication_m, only: lubrication_t
+  use contact_detection_m, only: contact_detection_t, detection_init
+  use contact_forces_m, only: loads_t, contact_report_t, energy_in_memory
+  use substep_limits_m, only: longest_substep_of
+  implicit none
+  private
+  public :: contact_solver_t, start_solver, met_t, store_counterparts, count_counterparts
+
+  !> Pairs that touched, sorted.
+  type :: met_t
+    integer :: n = 0
+    integer, allocatable :: a(:), b(:)   !! (n)
+  end type met_t
+
+  type, abstract :: contact_solver_t
+    type(contact_detection_t) :: detected        !! what touches now
+    type(displacements_t) :: displacements       !! the memory: part of the state of a run
+    logical :: warm_start = .false.              !! it has the forces too: a solution begins there
+    type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
+    type(lubrication_t) :: lubrication
+    real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
+    real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
+    type(loads_t) :: loads
+    type(met_t) :: met                           !! pairs that touched in this step
+  contains
+    procedure(init_i), pass(contacts), deferred :: init
+    procedure(advance_i), pass(contacts), deferred :: advance
+    procedure, pass(contacts) :: detect => detect_in_steps
+    procedure, pass(contacts) :: load_if_still => load_of_memory
+    procedure, pass(contacts) :: store_forces => keep_forces
+    procedure, pass(contacts) :: energy => energy_of_memory
+  end type contact_solver_t
+
+  abstract interface
+    !> The solver of a case, without any contact point yet.
+    subroutine init_i(input, blocks, contacts)
+      import :: contact_input_t, blocks_t, contact_solver_t
+      implicit none
+      type(contact_input_t), intent(in) :: input
+      type(blocks_t), intent(in) :: blocks
+      class(contact_solver_t), intent(inout) :: contacts
+    end subroutine init_i
+
+    !> Move the bodies through a fluid step, and add what contact does to them to its loads.
+    subroutine advance_i(walls, gravity, dt, contacts, blocks, report)
+      import :: walls_t, wp, contact_solver_t, blocks_t, contact_report_t
+      implicit none
+      type(walls_t), intent(in) :: walls
+      real(wp), intent(in) :: gravity(3)   !! [m/s2]
+      real(wp), intent(in) :: dt           !! fluid step [s]
+      class(contact_solver_t), intent(inout) :: contacts
+      type(blocks_t), intent(inout) :: blocks
+      type(contact_report_t), intent(inout) :: report
+    end subroutine advance_i
+  end interface
+
+contains
+
+  !> What is common to all solvers.
+  subroutine start_solver(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    class(contact_solver_t), intent(inout) :: contacts
+
+    call detection_init(input, longest_substep_of(input), blocks, contacts%detected)
+    associate (loads => contacts%loads, n => blocks%n)
+      allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
+        loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), source=0.0_wp)
+      allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
+    end associate
+    call sleep_init(input%sleep, contacts%detected%bounding_radius, contacts%sleep)
+    call reserve_displacements(1, contacts%displacements)
+  end subroutine start_solver
+
+  !> Find what touches at the start and at the end of a step: not for a solver that does so in its
+  !! steps alone.
+  subroutine detect_in_steps(walls, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    class(contact_solver_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+
+    associate (unused => walls%n, unused_too => contacts%met%n, unused_as_well => blocks%n)
+    end associate
+  end subroutine detect_in_steps
+
+  !> Contact forces and torques of the coming step if the candidates for sleep begin it at rest: as
+  !! remembered.
+  subroutine load_of_memory(walls, gravity, dt, candidate, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3), dt   !! [m/s2], fluid step [s]
+    logical, intent(in) :: candidate(:)      !! (n)
+    class(contact_solver_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+
+    associate (unused => walls%n, unused_too => gravity, unused_as_well => dt, &
+               unused_here => candidate, unused_there => blocks%n)
+    end associate
+    contacts%loads%force = 0.0_wp
+    contacts%loads%torque = 0.0_wp
+    call sum_memory(contacts%displacements, contacts%loads%force(:, 1:), &
+                    contacts%loads%torque(:, 1:))
+  end subroutine load_of_memory
+
+  !> Store the forces of chosen contact points, those of `load_if_still`: they are in memory.
+  subroutine keep_forces(chosen, contacts)
+    logical, intent(in) :: chosen(:)   !! (displacements)
+    class(contact_solver_t), intent(inout) :: contacts
+
+    associate (unused => chosen, unused_too => contacts%met%n)
+    end associate
+  end subroutine keep_forces
+
+  !> Elastic energy of all contact points [J].
+  pure function energy_of_memory(contacts) result(energy)
+    class(contact_solver_t), intent(in) :: contacts
+    real(wp) :: energy
+
+    energy = energy_in_memory(contacts%displacements) + energy_in_memory(contacts%sleep%frozen)
+  end function energy_of_memory
+
+  !> Add pairs that touch to those that touched in this step.
+  subroutine store_counterparts(points_a, points_b, met)
+    integer, intent(in) :: points_a(:), points_b(:)       !! (points) sorted
+    type(met_t), intent(inout) :: met
+    integer :: t, m, a, b
+
+    a = 0
+    b = 0
+    m = 1
+    do t = 1, size(points_a)
+      if (a == points_a(t) .and. b == points_b(t)) cycle
+      a = points_a(t)
+      b = points_b(t)
+      do while (m <= met%n)
+        if (.not. comes_before(met%a(m), met%b(m), 0, a, b, 0)) exit
+        m = m + 1
+      end do
+      if (m <= met%n) then
+        if (met%a(m) == a .and. met%b(m) == b) cycle
+      end if
+      call ensure_capacity(met%n + 1, met%a)
+      call ensure_capacity(met%n + 1, met%b)
+      met%a(m + 1:met%n + 1) = met%a(m:met%n)
+      met%b(m + 1:met%n + 1) = met%b(m:met%n)
+      met%a(m) = a
+      met%b(m) = b
+      met%n = met%n + 1
+    end do
+  end subroutine store_counterparts
+
+  !> Number of counterparts each body met in this step, and whether the floor was one of them.
+  pure subroutine count_counterparts(met, blocks)
+    type(met_t), intent(in) :: met
+    type(blocks_t), intent(inout) :: blocks
+    integer :: m, a, b
+
+    blocks%contacts = 0
+    blocks%on_floor = 0
+    do m = 1, met%n
+      a = met%a(m)
+      b = met%b(m)
+      blocks%contacts(a) = blocks%contacts(a) + 1
+      if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
+      if (b == floor_wall .or. b == bed_counterpart) blocks%on_floor(a) = 1
+    end do
+  end subroutine count_counterparts
+
+end module contact_solver_m

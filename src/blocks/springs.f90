@@ -1,0 +1,265 @@
+!> Contact by springs and dashpots: the substeps of a fluid step.
+!!
+!! Each substep moves the bodies half way, finds what touches, changes the velocities, and moves
+!! them the other half, so that springs are second order in time and a free fall is exact.
+module springs_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t, is_given
+  use vectors_m, only: norm
+  use rigid_body_m, only: blocks_t, drift, kick_body
+  use walls_m, only: walls_t
+  use sleep_m, only: put_to_sleep
+  use lubrication_m, only: lubricate
+  use counterparts_m, only: wrench_t, update_motion, motion_between
+  use displacements_m, only: displacements_t, reserve_displacements
+  use contact_law_m, only: stored_energy
+  use contact_detection_m, only: detect_contacts, list_bodies
+  use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
+    sum_forces, push_group, elastic_energy
+  use substep_limits_m, only: limits_t, longest_substep_of, substep_limit, stiffness_limit, &
+    equal_substep
+  use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
+  use resting_m, only: hold_or_wake, restore_contacts
+  implicit none
+  private
+  public :: springs_t
+
+  integer, parameter :: max_substeps = 1000000   !! of a fluid step; beyond, something went wrong
+
+  type, extends(contact_solver_t) :: springs_t
+    type(limits_t) :: limits
+    type(displacements_t) :: before              !! work: displacements of the substep before
+    real(wp), allocatable :: support(:, :)
+      !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
+    !> Where bodies were, and how they turned, when a substep began: (3, n), (4, n), (3, n), (3, n).
+    real(wp), allocatable :: x(:, :), q(:, :), l(:, :), omega(:, :)
+    real(wp) :: substep = 0.0_wp                 !! with which `load_if_still` found forces [s]
+  contains
+    procedure, pass(contacts) :: init
+    procedure, pass(contacts) :: detect
+    procedure, pass(contacts) :: load_if_still
+    procedure, pass(contacts) :: store_forces
+    procedure, pass(contacts) :: advance
+    procedure, pass(contacts) :: energy
+  end type springs_t
+
+contains
+
+  subroutine init(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    class(springs_t), intent(inout) :: contacts
+    integer :: n
+
+    call start_solver(input, blocks, contacts)
+    contacts%limits = limits_t(1.0_wp, longest_substep_of(input), input%courant_max)
+    if (is_given(input%substep_ratio)) contacts%limits%substep_ratio = input%substep_ratio
+    call reserve_displacements(1, contacts%before)
+    n = blocks%n
+    allocate (contacts%support(6, n), contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), &
+      contacts%omega(3, n), source=0.0_wp)
+  end subroutine init
+
+  subroutine detect(walls, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    class(springs_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+
+    call detect_contacts(walls, blocks, 0.0_wp, contacts%detected)
+  end subroutine detect
+
+  !> Contact forces and torques of the first substep if the candidates for sleep begin it at rest.
+  subroutine load_if_still(walls, gravity, dt, candidate, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3), dt   !! [m/s2], fluid step [s]
+    logical, intent(in) :: candidate(:)      !! (n)
+    class(springs_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    type(contact_report_t) :: ignored
+    integer :: b
+
+    contacts%substep = equal_substep(dt, substep_limit(walls, contacts%detected, blocks, dt, &
+                                                       contacts%limits))
+    call match_displacements(contacts%detected, contacts%before, contacts%displacements)
+    associate (acting => contacts%detected%acting, counterparts => contacts%detected%counterparts)
+      call update_motion(blocks, acting%body(:acting%n), counterparts)
+      do b = 1, blocks%n   ! velocities in the middle of the substep
+        if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+        associate (v => counterparts%v(:, b), omega => counterparts%omega(:, b))
+          if (candidate(b)) v = 0.0_wp
+          if (candidate(b)) omega = 0.0_wp
+          v = v + 0.5_wp*contacts%substep*(gravity + contacts%steady(:, b)/blocks%mass(b))
+          omega = omega + 0.5_wp*contacts%substep &
+            *matmul(counterparts%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+        end associate
+      end do
+    end associate
+    call sum_forces(contacts%substep, contacts%detected, contacts%displacements, contacts%loads, &
+                    ignored)
+  end subroutine load_if_still
+
+  !> Store the forces and energies of chosen contact points with their displacements.
+  subroutine store_forces(chosen, contacts)
+    logical, intent(in) :: chosen(:)   !! (displacements)
+    class(springs_t), intent(inout) :: contacts
+    type(contact_report_t) :: ignored
+    type(wrench_t) :: wrench
+    integer :: g, t
+
+    associate (detected => contacts%detected, displacements => contacts%displacements)
+      do g = 1, displacements%n
+        if (.not. chosen(g)) cycle
+        wrench = wrench_t()
+        call push_group(g, contacts%substep, motion_between(detected%counterparts, &
+          displacements%a(g), displacements%b(g)), detected, displacements, wrench, ignored)
+        displacements%force(:, g) = wrench%force
+        displacements%torque_a(:, g) = wrench%torque_a
+        displacements%torque_b(:, g) = wrench%torque_b
+        displacements%energy(g) = stored_energy(displacements%k(g), detected%law%gamma_t, &
+          norm(displacements%xi(:, g)))
+        do t = detected%groups%first(g), detected%groups%first(g + 1) - 1
+          displacements%energy(g) = displacements%energy(g) + detected%response%energy(t)
+        end do
+      end do
+    end associate
+  end subroutine store_forces
+
+  !> Move the blocks through a fluid step in substeps.
+  subroutine advance(walls, gravity, dt, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    class(springs_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(inout) :: report
+    real(wp) :: left, longest, dt_b
+    integer :: b
+
+    ! What holds those asleep acts for the whole step: a substep adds by how much the force on them
+    ! differs. All of them are tested in the first substep, those that something touches in others.
+    do b = 1, blocks%n
+      contacts%support(:, b) = 0.0_wp
+      if (.not. blocks%asleep(b)) cycle
+      associate (support => contacts%support(:, b), loads => contacts%loads)
+        support(1:3) = -(contacts%steady(:, b) + blocks%mass(b)*gravity)
+        support(4:6) = -blocks%fluid_torque(:, b)
+        loads%impulse(:, b) = loads%impulse(:, b) + dt*support(1:3)
+        loads%twist(:, b) = loads%twist(:, b) + dt*support(4:6)
+      end associate
+    end do
+    left = dt
+    do while (left > 0.0_wp)
+      longest = substep_limit(walls, contacts%detected, blocks, dt, contacts%limits)
+      if (.not. left < longest*real(max_substeps, wp)) then
+        report%info = 1
+        return
+      end if
+      call drift_to_middle(walls, left, longest, contacts, blocks, dt_b)
+      call push_bodies(walls, gravity, dt_b, contacts, blocks, report)
+      left = merge(left - dt_b, 0.0_wp, dt_b < left)
+      report%substeps = report%substeps + 1
+    end do
+  end subroutine advance
+
+  !> Begin a substep: drift for half of it and find what touches then.
+  !!
+  !! The step is an equal part of the time left. Where the bodies come down on more contact points
+  !! than the step is short enough for, now or before its end, they go back and take a shorter one.
+  subroutine drift_to_middle(walls, left, limit, contacts, blocks, dt_b)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: left, limit   !! time left, longest substep allowed [s]
+    type(springs_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    real(wp), intent(out) :: dt_b         !! the substep [s]
+    real(wp), parameter :: bearable = 1.3_wp   !! times the limit of stiffness: not worth going back
+    real(wp) :: longest, allowed, time
+    integer :: b
+
+    time = blocks%time
+    do b = 1, blocks%n
+      if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
+      contacts%x(:, b) = blocks%x(:, b)
+      contacts%q(:, b) = blocks%q(:, b)
+      contacts%l(:, b) = blocks%l(:, b)
+      contacts%omega(:, b) = blocks%omega(:, b)
+    end do
+    longest = limit
+    do
+      dt_b = equal_substep(left, longest)
+      call drift(0.5_wp*dt_b, blocks)
+      call detect_contacts(walls, blocks, 0.5_wp*dt_b, contacts%detected)
+      allowed = stiffness_limit(contacts%detected)
+      if (.not. dt_b > bearable*min(allowed, longest)) exit
+      do b = 1, blocks%n
+        if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
+        blocks%x(:, b) = contacts%x(:, b)
+        blocks%q(:, b) = contacts%q(:, b)
+        blocks%l(:, b) = contacts%l(:, b)
+        blocks%omega(:, b) = contacts%omega(:, b)
+      end do
+      blocks%time = time
+      longest = allowed
+    end do
+  end subroutine drift_to_middle
+
+  !> The rest of a substep: contact and the other half of the drift.
+  subroutine push_bodies(walls, gravity, dt_b, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3), dt_b   !! [m/s2, s]
+    type(springs_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(inout) :: report
+    real(wp), parameter :: none(3) = 0.0_wp
+    logical :: woke
+    integer :: k
+
+    if (report%substeps == 0 .or. contacts%lubrication%active) call list_bodies(blocks%present, &
+      contacts%detected%acting)
+    associate (detected => contacts%detected, displacements => contacts%displacements, &
+               loads => contacts%loads, support => contacts%support, &
+               acting => contacts%detected%acting%body(:contacts%detected%acting%n))
+      associate (point => detected%points%item(:detected%points%n))
+        call store_counterparts(point%a, point%b, contacts%met)
+      end associate
+      call match_displacements(detected, contacts%before, displacements)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
+      do k = 1, size(acting)
+        associate (b => acting(k))
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+                         b, blocks)
+        end associate
+      end do
+      call update_motion(blocks, acting, detected%counterparts)
+      call sum_forces(dt_b, detected, displacements, loads, report)
+      if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
+        contacts%lubrication, loads%force)
+      woke = .false.
+      if (contacts%sleep%active) call hold_or_wake(gravity, contacts, blocks, woke)
+      do k = 1, size(acting)
+        associate (b => acting(k))
+          loads%impulse(:, b) = loads%impulse(:, b) + dt_b*(loads%force(:, b) - support(1:3, b))
+          loads%twist(:, b) = loads%twist(:, b) + dt_b*(loads%torque(:, b) - support(4:6, b))
+          call kick_body(none, dt_b, contacts%share(b)*loads%force(:, b), loads%torque(:, b), b, &
+                         blocks)
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+                         b, blocks)
+          ! sleepers had the velocity of the middle of the substep, and have none at its end
+          if (blocks%asleep(b)) call put_to_sleep(b, blocks)
+        end associate
+      end do
+      call update_motion(blocks, acting, detected%counterparts)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
+    end associate
+    call drift(0.5_wp*dt_b, blocks)
+    if (woke) call restore_contacts(blocks, contacts)
+  end subroutine push_bodies
+
+  !> Energy of the springs, at the present poses, and of those asleep [J].
+  pure function energy(contacts)
+    class(springs_t), intent(in) :: contacts
+    real(wp) :: energy
+
+    energy = elastic_energy(contacts%detected, contacts%displacements, contacts%sleep%frozen)
+  end function energy
+
+end module springs_m
