@@ -21,6 +21,7 @@ module contact_surface_m
   use bed_m, only: bed_t, bed_counterpart, bed_place
   use neighbours_m, only: pair_list_t, near_pairs
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
+  use displacements_m, only: comes_before
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
@@ -35,8 +36,8 @@ module contact_surface_m
   type :: pair_t
     integer :: a = 0, b = 0
     real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
-    type(near_features_t) :: near                !! before they have moved by a skin
-    type(short_list_t) :: close                  !! before they have moved a little
+    type(near_features_t), allocatable :: near   !! before they have moved by a skin
+    type(short_list_t), allocatable :: close     !! before they have moved a little
   end type pair_t
 
   type :: contact_surface_t
@@ -48,9 +49,7 @@ module contact_surface_m
     real(wp) :: listed_skin = 0.0_wp             !! of the present list [m]
     real(wp) :: clear = 0.0_wp                   !! way of pairs that are not in it to touch [m]
     type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
-    integer, allocatable :: slot(:)              !! (near%n) place of each in `pairs`
-    type(pair_t), allocatable :: pairs(:)
-    logical, allocatable :: taken(:)             !! (size of pairs)
+    type(pair_t), allocatable :: pairs(:)        !! (near%n)
     type(pair_t), allocatable :: with_bed(:)     !! (bodies) each with the bed
     !> Bodies and places of the list of pairs.
     logical :: listed = .false.
@@ -58,7 +57,6 @@ module contact_surface_m
     real(wp), allocatable :: x(:, :)
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: q(:, :)             !! (4, bodies) the attitudes of that
-    integer, allocatable :: old_slot(:), old_a(:), old_b(:)   !! work
     !> Pairs that can touch: not both still, not both fixed.
     logical :: live_listed = .false.
     integer :: n_live = 0
@@ -87,7 +85,7 @@ contains
     end do
     allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
-    allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
+    allocate (self%pairs(0), self%with_bed(blocks%n))
     allocate (self%state(blocks%n), source=0)
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
@@ -95,6 +93,7 @@ contains
       self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
       self%with_bed(b)%b = bed_counterpart
+      allocate (self%with_bed(b)%near, self%with_bed(b)%close)
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest
@@ -145,7 +144,7 @@ contains
       end if
       do while (p <= self%n_live)
         if (self%near%a(self%live(p)) /= a) exit
-        call add_pair_points(blocks, ahead, self%slot(self%live(p)), self, points)
+        call add_pair_points(blocks, ahead, self%live(p), self, points)
         p = p + 1
       end do
     end do
@@ -203,46 +202,39 @@ contains
   end function pairs_may_be_missing
 
   !> List the pairs of bodies whose bounding spheres may meet before a body has moved far; pairs
-  !! that were listed before keep their place.
+  !! that were listed before keep their features.
   subroutine list_pairs(walls, blocks, self)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(inout) :: self
-    integer :: p, n_old, m
+    type(pair_t), allocatable :: before(:)
+    logical :: same
+    integer :: p, m
 
-    n_old = self%near%n
-    call ensure_capacity(n_old, self%old_slot)
-    call ensure_capacity(n_old, self%old_a)
-    call ensure_capacity(n_old, self%old_b)
-    if (n_old > 0) then
-      self%old_slot(:n_old) = self%slot(:n_old)
-      self%old_a(:n_old) = self%near%a(:n_old)
-      self%old_b(:n_old) = self%near%b(:n_old)
-    end if
     call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%wide_skin, &
       self%near)
-    call ensure_capacity(self%near%n, self%slot)
-    ! Give each pair that was listed before its place, others none yet.
-    self%taken = .false.
+    call move_alloc(self%pairs, before)
+    allocate (self%pairs(self%near%n))
     m = 1
     do p = 1, self%near%n
-      self%slot(p) = 0
-      do while (m <= n_old)
-        if (self%old_a(m) > self%near%a(p)) exit
-        if (self%old_a(m) == self%near%a(p) .and. self%old_b(m) >= self%near%b(p)) exit
-        m = m + 1
-      end do
-      if (m > n_old) cycle
-      if (self%old_a(m) /= self%near%a(p) .or. self%old_b(m) /= self%near%b(p)) cycle
-      self%slot(p) = self%old_slot(m)
-      self%taken(self%slot(p)) = .true.
-    end do
-    call take_slots(self)
-    do p = 1, self%near%n
-      associate (pair => self%pairs(self%slot(p)))
-        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) call forget(pair)
-        pair%shift = self%near%shift(:, p)
+      associate (a => self%near%a(p), b => self%near%b(p), shift => self%near%shift(:, p))
+        self%pairs(p)%a = a
+        self%pairs(p)%b = b
+        self%pairs(p)%shift = shift
+        do while (m <= size(before))
+          if (.not. comes_before(before(m)%a, before(m)%b, 0, a, b, 0)) exit
+          m = m + 1
+        end do
+        same = m <= size(before)
+        if (same) same = before(m)%a == a .and. before(m)%b == b &
+          .and. all(abs(before(m)%shift - shift) <= 0.0_wp)
       end associate
+      if (same) then
+        call move_alloc(before(m)%near, self%pairs(p)%near)
+        call move_alloc(before(m)%close, self%pairs(p)%close)
+      else
+        allocate (self%pairs(p)%near, self%pairs(p)%close)
+      end if
     end do
     self%listed = .true.
     self%live_listed = .false.
@@ -250,43 +242,6 @@ contains
     self%present = blocks%present
     self%x = blocks%x
   end subroutine list_pairs
-
-  !> Give a free place to each pair without one.
-  subroutine take_slots(self)
-    type(contact_surface_t), intent(inout) :: self
-    integer :: p, place, m
-    type(pair_t), allocatable :: longer(:)
-
-    place = 1
-    do p = 1, self%near%n
-      if (self%slot(p) > 0) cycle
-      do while (place <= size(self%taken))
-        if (.not. self%taken(place)) exit
-        place = place + 1
-      end do
-      m = size(self%pairs)
-      if (place > m) then
-        allocate (longer(max(place, 2*m, 16)))
-        longer(:m) = self%pairs
-        call move_alloc(longer, self%pairs)
-        call ensure_capacity(size(self%pairs), self%taken)
-        self%taken(m + 1:) = .false.
-      end if
-      self%taken(place) = .true.
-      self%slot(p) = place
-      self%pairs(place)%a = self%near%a(p)
-      self%pairs(place)%b = self%near%b(p)
-      call forget(self%pairs(place))
-    end do
-  end subroutine take_slots
-
-  !> Let no list of a pair hold any more.
-  pure subroutine forget(pair)
-    type(pair_t), intent(inout) :: pair
-
-    pair%near%valid = -1.0_wp
-    pair%close%left = -1.0_wp
-  end subroutine forget
 
   !> Contact points of body a and wall w: its corners, or its lowest point where it is a sphere.
   subroutine add_wall_points(walls, blocks, a, w, gap, self, points)
@@ -349,21 +304,21 @@ contains
   end subroutine add_bed_points
 
   !> Contact points of a listed pair of bodies.
-  subroutine add_pair_points(blocks, ahead, slot, self, points)
+  subroutine add_pair_points(blocks, ahead, p, self, points)
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead                !! [s]
-    integer, intent(in) :: slot                  !! place of the pair
+    integer, intent(in) :: p                     !! pair
     type(contact_surface_t), intent(inout) :: self
     type(contact_points_t), intent(inout) :: points
     type(meeting_t) :: now
     integer :: a, b
 
-    a = self%pairs(slot)%a
-    b = self%pairs(slot)%b
+    a = self%pairs(p)%a
+    b = self%pairs(p)%b
     now%poses = poses_t(blocks%x(:, a), blocks%x(:, b), blocks%q(:, a), blocks%q(:, b))
     now%turn_a = self%turn(:, :, a)
     now%turn_b = self%turn(:, :, b)
-    now%to_b = now%poses%x_b + self%pairs(slot)%shift - now%poses%x_a
+    now%to_b = now%poses%x_b + self%pairs(p)%shift - now%poses%x_a
     now%v = blocks%v(:, a) - blocks%v(:, b)
     now%omega_a = blocks%omega(:, a)
     now%omega_b = blocks%omega(:, b)
@@ -376,9 +331,9 @@ contains
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
-        call add_ball_point(now, surface_a, surface_b, self%pairs(slot), points)
+        call add_ball_point(now, surface_a, surface_b, self%pairs(p), points)
       else
-        call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(slot), points)
+        call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(p), points)
       end if
     end associate
   end subroutine add_pair_points
