@@ -6,12 +6,12 @@
 !! no order of the work can change.
 module overlap_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, norm, rotation_matrix
+  use vectors_m, only: norm, rotation_matrix
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
-  use surface_search_m, only: found_t, gather_edges
+  use surface_search_m, only: found_t, gather_edges, search_surface
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
   use deep_overlaps_m, only: deep_overlaps_t, forget_overlaps, store_overlap, size_of_pair, &
@@ -28,7 +28,7 @@ module overlap_m
     type(pair_list_t) :: pairs
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: radius(:)           !! (bodies) [m]
-    type(found_t) :: found                       !! of the bed
+    type(found_t) :: found                       !! work
   end type overlap_t
 
 contains
@@ -55,12 +55,13 @@ contains
     real(wp), intent(in) :: q_a(4), q_b(4)   !! attitudes
     real(wp) :: depth
     type(solid_t) :: a, b
+    type(found_t) :: found
 
     depth = 0.0_wp
     if (norm(x_a - x_b) >= shape_a%radius + shape_b%radius) return
     call prepare(shape_a, a)
     call prepare(shape_b, b)
-    call deepen_pair(a, rotation_matrix(q_a), b, rotation_matrix(q_b), x_a - x_b, depth)
+    call deepen_pair(a, rotation_matrix(q_a), b, rotation_matrix(q_b), x_a - x_b, found, depth)
   end function overlap_depth
 
   !> Depth of a body behind the walls; zero where it is inside the tank [m].
@@ -102,7 +103,7 @@ contains
         d = d - nearest_shift(walls%period, -d)
         if (norm(d) >= own%radius + overlap%solid(blocks%shape(b))%radius) cycle
         call deepen_pair(own, turn, overlap%solid(blocks%shape(b)), &
-          rotation_matrix(blocks%q(:, b)), d, depth)
+          rotation_matrix(blocks%q(:, b)), d, found, depth)
       end do
     end associate
     free = depth <= release_overlap*blocks%shapes(blocks%shape(c))%smallest_edge
@@ -110,13 +111,14 @@ contains
 
   !> Whether the places of two bodies exclude one another: they reach deeper into one another than a
   !! release allows the smaller.
-  pure function exclude(walls, blocks, a, b, overlap) result(yes)
+  function exclude(walls, blocks, a, b, overlap) result(yes)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, b
     type(overlap_t), intent(in) :: overlap
     logical :: yes
     real(wp) :: d(3), depth, allowed
+    type(found_t) :: found
 
     d = blocks%x(:, a) - blocks%x(:, b)
     d = d - nearest_shift(walls%period, -d)
@@ -127,7 +129,7 @@ contains
         blocks%shapes(blocks%shape(b))%smallest_edge)
       depth = allowed
       call deepen_pair(one, rotation_matrix(blocks%q(:, a)), two, rotation_matrix(blocks%q(:, b)), &
-        d, depth)
+        d, found, depth)
     end associate
     yes = depth > allowed
   end function exclude
@@ -144,7 +146,7 @@ contains
     type(deep_overlaps_t), intent(inout) :: deep
     integer, parameter :: wall = 0
     logical :: asked(blocks%n)
-    real(wp) :: found
+    real(wp) :: deepest
     integer :: a, b, p
 
     depth = 0.0_wp
@@ -157,13 +159,13 @@ contains
       associate (solid => overlap%solid(blocks%shape(a)))
         overlap%radius(a) = solid%radius
         if (blocks%fixed(a)) cycle
-        found = worth_finding(a, wall, depth, deep)
+        deepest = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
-          overlap%turn(:, :, a), walls, found)
+          overlap%turn(:, :, a), walls, deepest)
         if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), overlap%turn(:, :, a), &
-          walls%bed, overlap%found, found)
-        call store_overlap(a, wall, found, deep)
-        depth = max(depth, found)
+          walls%bed, overlap%found, deepest)
+        call store_overlap(a, wall, deepest, deep)
+        depth = max(depth, deepest)
       end associate
     end do
     call near_pairs(blocks%x, overlap%radius, asked, walls%period, 0.0_wp, overlap%pairs)
@@ -171,12 +173,12 @@ contains
       a = overlap%pairs%a(p)
       b = overlap%pairs%b(p)
       if (blocks%fixed(a) .and. blocks%fixed(b)) cycle
-      found = worth_finding(a, b, depth, deep)
+      deepest = worth_finding(a, b, depth, deep)
       call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
         overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &
-        blocks%x(:, a) - blocks%x(:, b) - overlap%pairs%shift(:, p), found)
-      call store_overlap(a, b, found, deep)
-      depth = max(depth, found)
+        blocks%x(:, a) - blocks%x(:, b) - overlap%pairs%shift(:, p), overlap%found, deepest)
+      call store_overlap(a, b, deepest, deep)
+      depth = max(depth, deepest)
     end do
   end subroutine max_overlap
 
@@ -192,21 +194,22 @@ contains
   end function worth_finding
 
   !> Raise `depth` to the depth of two bodies in one another, if that is larger.
-  pure subroutine deepen_pair(a, turn_a, b, turn_b, d, depth)
+  subroutine deepen_pair(a, turn_a, b, turn_b, d, found, depth)
     type(solid_t), intent(in) :: a, b
     real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body to space
     real(wp), intent(in) :: d(3)                         !! centre of a minus centre of b [m]
+    type(found_t), intent(inout) :: found                !! work
     real(wp), intent(inout) :: depth
 
     if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
       depth = max(depth, a%ball + b%ball - norm(d))
     else if (a%ball > 0.0_wp) then
-      call deepen_ball(a%ball, matmul(d, turn_b), b, depth)
+      call deepen_ball(a%ball, matmul(d, turn_b), b, found, depth)
     else if (b%ball > 0.0_wp) then
-      call deepen_ball(b%ball, matmul(-d, turn_a), a, depth)
+      call deepen_ball(b%ball, matmul(-d, turn_a), a, found, depth)
     else
-      call deepen_samples(a, matmul(transpose(turn_b), turn_a), matmul(d, turn_b), b, depth)
-      call deepen_samples(b, matmul(transpose(turn_a), turn_b), matmul(-d, turn_a), a, depth)
+      call deepen_samples(a, matmul(transpose(turn_b), turn_a), matmul(d, turn_b), b, found, depth)
+      call deepen_samples(b, matmul(transpose(turn_a), turn_b), matmul(-d, turn_a), a, found, depth)
     end if
   end subroutine deepen_pair
 
@@ -276,19 +279,18 @@ contains
         do i = 0, ceiling(edge%extent/body%spacing)
           p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x
           if (dot_product(p, p) > body%radius**2) cycle
-          p = matmul(p, turn)
-          if (any(p < body%tets%low) .or. any(p > body%tets%high)) cycle
-          if (inside(body, p)) call deepen_point(body, p, depth)
+          call deepen_point(body, matmul(p, turn), found, depth)
         end do
       end associate
     end do
   end subroutine deepen_bed
 
   !> Raise `depth` to the largest depth of the sample points of a below the surface of b.
-  pure subroutine deepen_samples(a, turn, d, b, depth)
+  subroutine deepen_samples(a, turn, d, b, found, depth)
     type(solid_t), intent(in) :: a, b
     real(wp), intent(in) :: turn(3, 3)   !! axes of a to axes of b
     real(wp), intent(in) :: d(3)         !! centre of a, axes of b [m]
+    type(found_t), intent(inout) :: found   !! work
     real(wp), intent(inout) :: depth
     real(wp) :: p(3)
     integer :: c, i
@@ -299,99 +301,37 @@ contains
         + a%bounding_radius(c))) cycle
       do i = a%cluster(c), a%cluster(c + 1) - 1
         p = d + turn(:, 1)*a%sample(1, i) + turn(:, 2)*a%sample(2, i) + turn(:, 3)*a%sample(3, i)
-        if (any(p < b%tets%low) .or. any(p > b%tets%high)) cycle
-        if (inside(b, p)) call deepen_point(b, p, depth)
+        call deepen_point(b, p, found, depth)
       end do
     end do
   end subroutine deepen_samples
 
-  !> Raise `depth` to the distance of an inner point from the surface, if that is larger.
-  !!
-  !! The bins round the point are searched ring by ring, and no further than needed: the search ends
-  !! as soon as the surface is found nearer than `depth`, or nearer than what is left to search.
-  pure subroutine deepen_point(solid, p, depth)
-    type(solid_t), intent(in) :: solid
-    real(wp), intent(in) :: p(3)             !! body axes [m]
+  !> Raise `depth` to that of a point below the surface of a body, if that is larger.
+  subroutine deepen_point(body, p, found, depth)
+    type(solid_t), intent(in) :: body
+    real(wp), intent(in) :: p(3)            !! body axes [m]
+    type(found_t), intent(inout) :: found   !! work
     real(wp), intent(inout) :: depth
-    real(wp) :: nearest, searched
-    integer :: home(3), a(3), b(3), ring, i, j, k, c, m
+    real(wp) :: distance, outward(3)
 
-    home = solid%faces%place(p)
-    nearest = huge(1.0_wp)
-    do ring = 0, maxval(solid%faces%n)
-      a = max(home - ring, 1)
-      b = min(home + ring, solid%faces%n)
-      do k = a(3), b(3)
-        do j = a(2), b(2)
-          do i = a(1), b(1)
-            if (maxval(abs([i, j, k] - home)) /= ring) cycle
-            c = solid%faces%number([i, j, k])
-            do m = solid%faces%first(c), solid%faces%first(c + 1) - 1
-              nearest = min(nearest, distance_squared(p, solid%face(:, :, solid%faces%item(m))))
-            end do
-          end do
-        end do
-      end do
-      if (nearest <= depth**2) return
-      searched = real(ring, wp)*minval(solid%faces%size)
-      if (nearest <= searched**2) exit
-    end do
-    depth = sqrt(nearest)
+    if (any(p < body%tets%low) .or. any(p > body%tets%high)) return
+    if (.not. inside(body, p)) return
+    call search_surface(body%surface, p, max(depth, body%spacing), found, distance, outward)
+    depth = max(depth, -distance)
   end subroutine deepen_point
 
   !> Raise `depth` to the depth of a ball in a body, if that is larger.
-  pure subroutine deepen_ball(radius, centre, solid, depth)
-    real(wp), intent(in) :: radius      !! [m]
-    real(wp), intent(in) :: centre(3)   !! axes of the body [m]
-    type(solid_t), intent(in) :: solid
+  subroutine deepen_ball(radius, centre, body, found, depth)
+    real(wp), intent(in) :: radius          !! [m]
+    real(wp), intent(in) :: centre(3)       !! axes of the body [m]
+    type(solid_t), intent(in) :: body
+    type(found_t), intent(inout) :: found   !! work
     real(wp), intent(inout) :: depth
-    real(wp) :: nearest
-    integer :: m
+    real(wp) :: distance, outward(3)
 
-    if (any(centre < solid%tets%low - radius) .or. any(centre > solid%tets%high + radius)) return
-    nearest = huge(1.0_wp)
-    do m = 1, size(solid%face, 3)
-      nearest = min(nearest, distance_squared(centre, solid%face(:, :, m)))
-    end do
-    if (any(centre < solid%tets%low) .or. any(centre > solid%tets%high)) then
-      depth = max(depth, radius - sqrt(nearest))
-    else if (inside(solid, centre)) then
-      depth = max(depth, radius + sqrt(nearest))
-    else
-      depth = max(depth, radius - sqrt(nearest))
-    end if
+    if (any(centre < body%tets%low - radius) .or. any(centre > body%tets%high + radius)) return
+    call search_surface(body%surface, centre, radius, found, distance, outward)
+    depth = max(depth, radius - distance)
   end subroutine deepen_ball
-
-  !> Square of the distance of a point from a triangle [m2].
-  !!
-  !! The point nearest in the plane if it lies in the triangle, else the nearest point of an edge.
-  pure function distance_squared(p, corner) result(s)
-    real(wp), intent(in) :: p(3)
-    real(wp), intent(in) :: corner(3, 3)
-    real(wp) :: s
-    real(wp) :: edge(3, 3), n(3), d(3, 3), r(3), u
-    integer :: c
-    logical :: in_plane
-
-    do c = 1, 3
-      edge(:, c) = corner(:, 1 + mod(c, 3)) - corner(:, c)
-      d(:, c) = p - corner(:, c)
-    end do
-    n = cross(edge(:, 1), edge(:, 2))
-    in_plane = .true.
-    do c = 1, 3
-      in_plane = in_plane .and. dot_product(cross(n, edge(:, c)), d(:, c)) >= 0.0_wp
-    end do
-    if (in_plane) then
-      s = dot_product(n, d(:, 1))**2/dot_product(n, n)
-      return
-    end if
-    s = huge(1.0_wp)
-    do c = 1, 3
-      u = dot_product(d(:, c), edge(:, c))/dot_product(edge(:, c), edge(:, c))
-      r = d(:, c) - min(max(u, 0.0_wp), 1.0_wp)*edge(:, c)
-      s = min(s, dot_product(r, r))
-    end do
-  end function distance_squared
 
 end module overlap_m

@@ -4,6 +4,8 @@ module overlap_solid_m
   use kinds_m, only: wp, i8
   use vectors_m, only: norms, cross, norm, inverse3
   use tet_mesh_m, only: shape_t, surface_of_tets
+  use surface_features_m, only: surface_init
+  use surface_search_m, only: surface_t
   use neighbours_m, only: bins_t, bins_build
   implicit none
   private
@@ -25,7 +27,8 @@ module overlap_solid_m
     real(wp), allocatable :: to_tet(:, :, :)
     real(wp), allocatable :: tet_origin(:, :)    !! (3, tets) corner 1 [m]
     real(wp), allocatable :: face(:, :, :)       !! (3, 3, triangles) corners of the surface [m]
-    type(bins_t) :: tets, faces                  !! the same in bins
+    type(bins_t) :: tets                         !! in bins
+    type(surface_t) :: surface                   !! for the depth of a point below it
     real(wp) :: spacing = 0.0_wp                 !! of points along sharp edges [m]
   end type solid_t
 
@@ -56,16 +59,12 @@ contains
       high(:, t) = maxval(shape%point(:, shape%flow_tet(:, t)), 2)
     end do
     call bins_build(low, high, shape%smallest_edge/bins_per_edge, solid%tets)
-    deallocate (low, high)
     call surface_of_tets(size(shape%point, 2), shape%flow_tet, triangle, triangle_tet)
-    n = size(triangle, 2)
-    allocate (solid%face(3, 3, n), low(3, n), high(3, n))
-    do t = 1, n
+    allocate (solid%face(3, 3, size(triangle, 2)))
+    do t = 1, size(triangle, 2)
       solid%face(:, :, t) = shape%point(:, triangle(:, t))
-      low(:, t) = minval(solid%face(:, :, t), 2)
-      high(:, t) = maxval(solid%face(:, :, t), 2)
     end do
-    call bins_build(low, high, shape%smallest_edge/bins_per_edge, solid%faces)
+    call surface_init(shape, solid%surface, with_net=.false.)
     call place_samples(shape, triangle, solid)
     call cluster_samples(0.5_wp*shape%smallest_edge, solid)
   end subroutine prepare
