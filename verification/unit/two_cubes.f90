@@ -12,7 +12,7 @@ module two_cubes_m
   use meeting_m, only: poses_t, meeting_t, update_views
   implicit none
   private
-  public :: make_solid, random_poses, moved, meeting_at, distance_from_cube
+  public :: make_solid, random_poses, moved, meeting_at, distance_from_cube, vector
 
 contains
 

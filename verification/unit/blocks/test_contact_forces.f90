@@ -3,7 +3,6 @@ module test_contact_forces_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: contact_input_t
-  use random_counter_m, only: uniform
   use vectors_m, only: cross
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, add_point, form_groups
@@ -13,6 +12,7 @@ module test_contact_forces_m
   use contact_detection_m, only: contact_detection_t
   use contact_forces_m, only: loads_t, contact_report_t, match_displacements, &
     integrate_displacements, sum_forces, elastic_energy
+  use two_cubes_m, only: vector
   implicit none
   private
   public :: test_contact_forces
@@ -290,13 +290,5 @@ contains
     call detect_again(point, detected, displacements)
     call check('what has parted is forgotten', displacements%xi(:, 3), 0*x, 0.0_wp)
   end subroutine check_memory
-
-  !> Three numbers between -1/2 and 1/2.
-  pure function vector(i, k) result(v)
-    integer, intent(in) :: i, k
-    real(wp) :: v(3)
-
-    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
-  end function vector
 
 end module test_contact_forces_m

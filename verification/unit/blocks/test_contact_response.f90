@@ -4,7 +4,6 @@ module test_contact_response_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: contact_input_t
-  use random_counter_m, only: uniform
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use contact_law_m, only: contact_law_t, load_t
@@ -12,6 +11,7 @@ module test_contact_response_m
   use counterparts_m, only: counterparts_t, motion_t, wrench_t, act
   use contact_response_m, only: response_t, respond, highest_frequency2, bound_by_sums, &
     opening_speed, push_apart, impact_turn
+  use two_cubes_m, only: vector
   implicit none
   private
   public :: test_contact_response
@@ -204,12 +204,5 @@ contains
         1.0e-13_wp)
     end do
   end subroutine check_power
-
-  pure function vector(i, k) result(v)
-    integer, intent(in) :: i, k
-    real(wp) :: v(3)
-
-    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
-  end function vector
 
 end module test_contact_response_m

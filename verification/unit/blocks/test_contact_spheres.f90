@@ -3,11 +3,11 @@
 module test_contact_spheres_m
   use kinds_m, only: wp
   use check_m, only: check
-  use random_counter_m, only: uniform
   use vectors_m, only: rotation_matrix, quaternion_exp, quaternion_product
   use contact_points_m, only: contact_points_t
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
   use world_m, only: world_t, set_up, body
+  use two_cubes_m, only: vector
   implicit none
   private
   public :: test_contact_spheres
@@ -178,13 +178,5 @@ contains
       end do
     end associate
   end function overlap_of_all
-
-  !> Three numbers between -1/2 and 1/2.
-  pure function vector(i, k) result(v)
-    integer, intent(in) :: i, k
-    real(wp) :: v(3)
-
-    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
-  end function vector
 
 end module test_contact_spheres_m

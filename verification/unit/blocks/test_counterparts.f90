@@ -3,9 +3,9 @@ module test_counterparts_m
   use kinds_m, only: wp
   use check_m, only: check
   use vectors_m, only: cross
-  use random_counter_m, only: uniform
   use counterparts_m, only: inertia_t, motion_t, wrench_t, inverse_effective_mass, act, &
     relative_velocity, largest_speed
+  use two_cubes_m, only: vector
   implicit none
   private
   public :: test_counterparts
@@ -75,12 +75,5 @@ contains
       1.0e-14_wp)
     call check('no twist together', twist, [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-14_wp)
   end subroutine check_reaction
-
-  pure function vector(i, k) result(v)
-    integer, intent(in) :: i, k
-    real(wp) :: v(3)
-
-    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
-  end function vector
 
 end module test_counterparts_m

@@ -3,9 +3,10 @@ module test_meeting_m
   use kinds_m, only: wp
   use check_m, only: check
   use vectors_m, only: rotation_matrix, quaternion_from_axis, quaternion_product
-  use random_counter_m, only: uniform, random_rotation
+  use random_counter_m, only: random_rotation
   use meeting_m, only: poses_t, view_t, meeting_t, update_views, inverse_view, seen_from, &
     box_in_view, way_between
+  use two_cubes_m, only: vector
   implicit none
   private
   public :: test_meeting
@@ -98,12 +99,5 @@ contains
     p = vector(k, 9)
     p = x + matmul(rotation_matrix(q), radius*p/norm2(p))
   end function place
-
-  pure function vector(i, k) result(v)
-    integer, intent(in) :: i, k
-    real(wp) :: v(3)
-
-    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
-  end function vector
 
 end module test_meeting_m
