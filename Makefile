@@ -132,10 +132,17 @@ $(C)/settings: $(B)/settings FORCE
 # A shell that a signal ends tells its number, which is not the same everywhere: Linux 10, macOS 30.
 sigusr1 = $(shell sh -c 'kill -s USR1 $$$$' 2> /dev/null; expr $$? % 128)
 
-$(C)/build_info.f90: FORCE
+errno = $(if $(filter Linux,$(shell uname)),__errno_location,__error)
+
+$(C)/system.f90: tools/system.in FORCE
 	@mkdir -p $(C)
 	$(if $(filter-out 0,$(sigusr1)),,$(error SIGUSR1 ends no shell here, so its number is unknown))
-	@awk -v version='$(VERSION)' -v flags='$(flags)' -v sigusr1=$(sigusr1) \
+	@sed -e 's/@SIGUSR1@/$(sigusr1)/' -e 's/@ERRNO@/$(errno)/' $< > $@.new
+	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+
+$(C)/build_info.f90: FORCE
+	@mkdir -p $(C)
+	@awk -v version='$(VERSION)' -v flags='$(flags)' \
 	  -v revision="$$(git describe --always --dirty --abbrev=12 2>/dev/null || echo unknown)" \
 	  -f tools/build_info.awk < /dev/null > $@.new
 	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
@@ -143,8 +150,9 @@ $(C)/build_info.f90: FORCE
 $(B)/sources: FORCE
 	$(call keep,$(sources) $(unit_sources) $(run_here))
 
-$(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
-	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@
+written = $(C)/build_info.f90 $(C)/system.f90
+$(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(written)
+	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(written) > $@
 
 no_build := deps lint clean help install install-tools run test verify mutate soak worlds bench bench-contact \
   paper-ensemble docs reference everything $(variants)

@@ -9,7 +9,7 @@ module faults_m
   use simulation_m, only: simulation_t
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
-  use release_m, only: n_pending, is_exit
+  use release_m, only: n_pending
   use deep_overlaps_m, only: overlap_fault
   implicit none
   private
@@ -138,7 +138,7 @@ contains
     do d = 1, 3
       do s = 1, 2
         if (grid%periodic(d)) cycle
-        if (is_exit(grid, gravity, s, d)) cycle
+        if (grid%is_exit(gravity, s, d)) cycle
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
         if (.not. is_wall(grid%side(s, d))) then   ! the top
           beyond = beyond - grid%length(d)

@@ -10,7 +10,7 @@ program mics
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use stack_limit_m, only: check_stack
   use signals_m, only: catch_signals
-  use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
+  use stop_requests_m, only: stop_requests_t, stop_asked
   use timers_m, only: wall_clock
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use case_file_m, only: read_text
@@ -67,7 +67,7 @@ program mics
   if (len(options%restart) == 0) then   ! else what was due has been written
     call write_due_output(sim%run_state_t, report, output)
   end if
-  call watch_for_stop(output%lock, options%max_wall, began, stop_requests)
+  stop_requests = stop_requests_t('', output%lock, options%max_wall, began, last=wall_clock())
   call store_places(sim, fault)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)

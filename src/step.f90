@@ -130,7 +130,7 @@ contains
     call sim%clock%advance()
     call describe(sim, contact, coupling_report, report)
     report%overlap_known = .false.
-    if (sim%clock%row_due() .or. sim%clock%finished()) then
+    if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
     else if (sim%contacts%detected%exact) then
       call look_for_deep(sim)

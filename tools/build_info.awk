@@ -1,6 +1,6 @@
 # A Fortran module that tells how the program was built.
 #
-# awk -v version=... -v revision=... -v flags=... -v sigusr1=... -f tools/build_info.awk < /dev/null
+# awk -v version=... -v revision=... -v flags=... -f tools/build_info.awk < /dev/null
 
 # A character constant, cut into pieces so that no line passes 100 columns.
 function constant(name, text, rest, out) {
@@ -29,13 +29,12 @@ END {
   print "  use, intrinsic :: iso_fortran_env, only: compiler_version"
   print "  implicit none"
   print "  private"
-  print "  public :: version, git_revision, compiler, flags, signal_user"
+  print "  public :: version, git_revision, compiler, flags"
   print ""
   print "  character(*), parameter :: compiler = compiler_version()"
   printf "%s", constant("version", version)
   printf "%s", constant("git_revision", revision)
   printf "%s", constant("flags", flags)
-  print "  integer, parameter :: signal_user = " sigusr1 "   !! SIGUSR1 of this system"
   print ""
   print "end module build_info_m"
 }

@@ -2,6 +2,7 @@
 module c_library_m
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funptr, c_int, c_long, &
     c_null_char, c_ptr, c_size_t
+  use system_m, only: c_errno_place
   implicit none
   private
   public :: c_access, c_close, c_closedir, c_dup, c_errno, c_exit, c_faccessat, c_fclose, &
@@ -274,12 +275,6 @@ module c_library_m
       integer(c_int), value :: code
     end subroutine c_exit
 
-    ! The last error; errno of C is a macro.
-    integer(c_int) function c_errno() bind(c, name='_gfortran_ierrno_i4')
-      import :: c_int
-      implicit none
-    end function c_errno
-
     type(c_ptr) function c_strerror(number) bind(c, name='strerror')
       import :: c_int, c_ptr
       implicit none
@@ -294,6 +289,15 @@ module c_library_m
   end interface
 
 contains
+
+  !> Number of the last error of a call of C.
+  function c_errno() result(number)
+    integer(c_int) :: number
+    integer(c_int), pointer :: last
+
+    call c_f_pointer(c_errno_place(), last)
+    number = last
+  end function c_errno
 
   !> The text that begins at an address, up to its null character.
   function text_at(start) result(text)

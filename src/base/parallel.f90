@@ -12,7 +12,7 @@ module parallel_m
   public :: parallel_init, parallel_final, parallel_abort, parallel_pause
   public :: is_root, nproc, my_rank, set_threads, get_threads, spins_for_long
   public :: decompose, halo_exchange, gather_all
-  public :: global_max, global_min, global_sum, global_sum_accumulators, broadcast
+  public :: global_max, global_sum, global_sum_accumulators, broadcast
   public :: set_file_access, set_collective
 
   !> Fill the halos of a block with `width` halo cells on every side.
@@ -52,17 +52,9 @@ module parallel_m
       integer, intent(inout) :: x
     end subroutine broadcast_integer
 
-    module subroutine broadcast_integers(x)
-      integer, intent(inout), contiguous :: x(:)
-    end subroutine broadcast_integers
-
-    module subroutine broadcast_real(x)
-      real(wp), intent(inout) :: x
-    end subroutine broadcast_real
-
-    module subroutine broadcast_reals(x)
-      real(wp), intent(inout), contiguous :: x(:)
-    end subroutine broadcast_reals
+    module subroutine broadcast_logical(x)
+      logical, intent(inout) :: x
+    end subroutine broadcast_logical
   end interface broadcast
 
   interface
@@ -123,11 +115,6 @@ module parallel_m
     module subroutine global_max(x)
       real(wp), intent(inout), contiguous :: x(:)
     end subroutine global_max
-
-    !> Smallest of the values of all processes, element by element, in place.
-    module subroutine global_min(x)
-      real(wp), intent(inout), contiguous :: x(:)
-    end subroutine global_min
 
     !> Sum over all processes of counts, element by element, in place.
     module subroutine global_sum(n)

@@ -10,7 +10,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_Alloc_mem, MPI_Free_mem, MPI_ADDRESS_KIND
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
   use mpi_f08, only: MPI_INFO_NULL
-  use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
+  use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_LOGICAL, MPI_MAX, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use c_library_m, only: c_setenv
   use decomposition_m, only: best_pieces, last_cell, min_cells
@@ -354,10 +354,6 @@ contains
     call MPI_Allreduce(MPI_IN_PLACE, x, size(x), MPI_DOUBLE_PRECISION, MPI_MAX, MPI_COMM_WORLD)
   end procedure global_max
 
-  module procedure global_min
-    call MPI_Allreduce(MPI_IN_PLACE, x, size(x), MPI_DOUBLE_PRECISION, MPI_MIN, MPI_COMM_WORLD)
-  end procedure global_min
-
   module procedure global_sum
     call MPI_Allreduce(MPI_IN_PLACE, n, size(n), MPI_INTEGER8, MPI_SUM, MPI_COMM_WORLD)
   end procedure global_sum
@@ -399,17 +395,9 @@ contains
     call MPI_Bcast(x, 1, MPI_INTEGER, 0, MPI_COMM_WORLD)
   end procedure broadcast_integer
 
-  module procedure broadcast_integers
-    call MPI_Bcast(x, size(x), MPI_INTEGER, 0, MPI_COMM_WORLD)
-  end procedure broadcast_integers
-
-  module procedure broadcast_real
-    call MPI_Bcast(x, 1, MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
-  end procedure broadcast_real
-
-  module procedure broadcast_reals
-    call MPI_Bcast(x, size(x), MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
-  end procedure broadcast_reals
+  module procedure broadcast_logical
+    call MPI_Bcast(x, 1, MPI_LOGICAL, 0, MPI_COMM_WORLD)
+  end procedure broadcast_logical
 
   module procedure set_file_access
     call h5pset_fapl_mpio_f(access, MPI_COMM_WORLD%MPI_VAL, MPI_INFO_NULL%MPI_VAL, status)

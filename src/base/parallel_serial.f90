@@ -78,10 +78,6 @@ contains
     x = x   ! the only process holds the result
   end procedure global_max
 
-  module procedure global_min
-    x = x   ! the only process holds the result
-  end procedure global_min
-
   module procedure global_sum
     n = n   ! the only process holds the result
   end procedure global_sum
@@ -98,17 +94,9 @@ contains
     x = x
   end procedure broadcast_integer
 
-  module procedure broadcast_integers
+  module procedure broadcast_logical
     x = x
-  end procedure broadcast_integers
-
-  module procedure broadcast_real
-    x = x
-  end procedure broadcast_real
-
-  module procedure broadcast_reals
-    x = x
-  end procedure broadcast_reals
+  end procedure broadcast_logical
 
   module procedure set_file_access
     status = merge(0, -1, access >= 0)   ! one process opens files as ever

@@ -8,7 +8,7 @@ module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
   use kinds_m, only: wp
   use c_library_m, only: c_signal
-  use build_info_m, only: signal_user
+  use system_m, only: signal_user
   use parallel_m, only: global_max
   implicit none
   private

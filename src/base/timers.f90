@@ -6,8 +6,7 @@ module timers_m
   use kinds_m, only: wp, i8, name_length
   implicit none
   private
-  public :: timer, tic, toc, wall_clock
-  public :: timer_count, timer_name, timer_seconds, timer_calls
+  public :: timer, tic, toc, wall_clock, phase_t, phases
 
   integer, parameter :: max_timers = 64
 
@@ -61,31 +60,11 @@ contains
     seconds = real(ticks, wp)/real(rate, wp)
   end function wall_clock
 
-  !> Number of phases.
-  integer function timer_count()
-    timer_count = n_phases
-  end function timer_count
+  !> The phases so far.
+  function phases() result(so_far)
+    type(phase_t) :: so_far(n_phases)
 
-  !> Name of phase `id`.
-  function timer_name(id) result(name)
-    integer, intent(in) :: id
-    character(:), allocatable :: name
-
-    name = trim(phase(id)%name)
-  end function timer_name
-
-  !> Total time of phase `id` [s].
-  real(wp) function timer_seconds(id)
-    integer, intent(in) :: id
-
-    timer_seconds = phase(id)%seconds
-  end function timer_seconds
-
-  !> How often phase `id` was timed.
-  integer function timer_calls(id)
-    integer, intent(in) :: id
-
-    timer_calls = phase(id)%calls
-  end function timer_calls
+    so_far = phase(:n_phases)
+  end function phases
 
 end module timers_m

@@ -17,7 +17,6 @@ module release_m
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
   use grid_m, only: grid_t
-  use boundary_kinds_m, only: is_wall
   use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, &
     left_out, out
   use walls_m, only: walls_t
@@ -26,7 +25,7 @@ module release_m
   implicit none
   private
   public :: release_due_blocks, let_go_lowered, next_release, n_pending, nothing_to_come
-  public :: take_out, is_exit
+  public :: take_out
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
   real(wp), parameter :: slack_share = 0.05_wp
@@ -252,8 +251,8 @@ contains
       passed = .false.
       do d = 1, 3
         associate (x => blocks%x(d, b) - grid%origin(d))
-          passed = passed .or. (x < 0.0_wp .and. is_exit(grid, gravity, 1, d)) &
-                   .or. (x > grid%length(d) .and. is_exit(grid, gravity, 2, d))
+          passed = passed .or. (x < 0.0_wp .and. grid%is_exit(gravity, 1, d)) &
+                   .or. (x > grid%length(d) .and. grid%is_exit(gravity, 2, d))
         end associate
       end do
       if (.not. passed) cycle
@@ -269,19 +268,6 @@ contains
         //') m with '//brief(norm(blocks%v(:, b)))//' m/s'
     end do
   end subroutine take_out
-
-  !> Does a block that passes this side leave the tank? Not through a wall or a period, nor through
-  !! an open top, from where it falls back.
-  pure function is_exit(grid, gravity, s, d) result(yes)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    integer, intent(in) :: s, d          !! side 1 or 2 of a direction
-    logical :: yes
-
-    yes = .not. (grid%periodic(d) .or. is_wall(grid%side(s, d))) &
-      .and. .not. (d == maxloc(abs(gravity), 1) &
-                   .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp)
-  end function is_exit
 
   !> Time of the next release that is still to come; huge if there is none [s].
   pure function next_release(time, blocks) result(next)

@@ -8,7 +8,7 @@
 module grid_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
-  use boundary_kinds_m, only: no_side, side_code, side_no_slip, side_periodic
+  use boundary_kinds_m, only: no_side, side_code, side_no_slip, side_periodic, is_wall
   use parallel_m, only: decompose
   implicit none
   private
@@ -46,6 +46,7 @@ module grid_m
     procedure :: side_faces => grid_side_faces
     procedure :: side_cells => grid_side_cells
     procedure :: min_spacing => grid_min_spacing
+    procedure :: is_exit => grid_is_exit
   end type grid_t
 
 contains
@@ -195,5 +196,18 @@ contains
 
     h = minval(self%h, self%n > 1)
   end function grid_min_spacing
+
+  !> Does what passes this side leave the tank? Not through a wall or a period, nor through an open
+  !! top, from where it falls back.
+  pure function grid_is_exit(self, gravity, s, d) result(yes)
+    class(grid_t), intent(in) :: self
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    integer, intent(in) :: s, d          !! side 1 or 2 of a direction
+    logical :: yes
+
+    yes = .not. (self%periodic(d) .or. is_wall(self%side(s, d))) &
+      .and. .not. (d == maxloc(abs(gravity), 1) &
+                   .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp)
+  end function grid_is_exit
 
 end module grid_m

@@ -8,24 +8,30 @@ module clock_m
   use case_types_m, only: run_t
   implicit none
   private
-  public :: clock_t, clock_init, clock_resume
+  public :: clock_t, clock_init
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times closer than this are one [s]
+
+  !> What is due at the multiples of an interval.
+  type :: schedule_t
+    real(wp) :: interval = 0.0_wp   !! [s]
+    real(wp) :: next = 0.0_wp       !! due time, huge: never [s]
+    integer :: n = 0                !! how often it was done when due
+  contains
+    procedure :: due, done, plan
+  end type schedule_t
 
   type :: clock_t
     real(wp) :: t = 0.0_wp          !! [s]
     real(wp) :: dt = 0.0_wp         !! of the last step, then of the present one [s]
     integer :: step = 0
-    integer :: n_rows = 0           !! due rows written so far, not one that only ends a run
-    integer :: n_frames = 0         !! likewise
+    type(schedule_t) :: rows, frames, restarts
     real(wp) :: rest_began = -1.0_wp   !! when all blocks came to rest [s]; < 0: they move
     real(wp) :: t_end = 0.0_wp      !! [s]
-    real(wp) :: next_row = 0.0_wp, next_frame = 0.0_wp, next_restart = 0.0_wp   !! due times [s]
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
     type(run_t) :: run              !! intervals and the rule for settling
   contains
     procedure :: choose_step, advance, finished, settled, store_speed
-    procedure :: row_due, frame_due, restart_due, row_done, frame_done, restart_done
   end type clock_t
 
 contains
@@ -37,18 +43,38 @@ contains
 
     clock%run = run
     clock%t_end = run%t_end
-    if (run%restart_interval > 0.0_wp) clock%next_restart = run%restart_interval
+    clock%rows%interval = run%history_interval
+    clock%frames%interval = run%field_interval
+    clock%frames%next = merge(0.0_wp, huge(clock%t), run%field_interval > 0.0_wp)
+    clock%restarts%interval = run%restart_interval
+    clock%restarts%next = merge(run%restart_interval, huge(clock%t), run%restart_interval > 0.0_wp)
   end subroutine clock_init
 
-  !> Set the due times of a clock whose t, step and counts came from a restart file: what was due at
-  !! t or before has been written.
-  subroutine clock_resume(clock)
-    type(clock_t), intent(inout) :: clock
+  !> Is it due at a time?
+  pure function due(self, t) result(yes)
+    class(schedule_t), intent(in) :: self
+    real(wp), intent(in) :: t   !! [s]
+    logical :: yes
 
-    clock%next_row = next_multiple(clock%run%history_interval, clock%t)
-    clock%next_frame = next_multiple(clock%run%field_interval, clock%t)
-    clock%next_restart = next_multiple(clock%run%restart_interval, clock%t)
-  end subroutine clock_resume
+    yes = t >= self%next - same_time
+  end function due
+
+  !> What was due has been done.
+  pure subroutine done(self, t)
+    class(schedule_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! [s]
+
+    self%n = self%n + 1
+    call self%plan(t)
+  end subroutine done
+
+  !> What was due at a time or before has been done, as in a run that goes on.
+  pure subroutine plan(self, t)
+    class(schedule_t), intent(inout) :: self
+    real(wp), intent(in) :: t   !! [s]
+
+    if (self%next < huge(t)) self%next = next_multiple(self%interval, t)
+  end subroutine plan
 
   !> First multiple of an interval that lies after t; t itself if they lie closer than times can be
   !! told apart, so that each step is due.
@@ -125,53 +151,5 @@ contains
       self%rest_began = self%t
     end if
   end subroutine store_speed
-
-  !> Is a row due now?
-  pure function row_due(self) result(yes)
-    class(clock_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%t >= self%next_row - same_time
-  end function row_due
-
-  !> Is a frame due now?
-  pure function frame_due(self) result(yes)
-    class(clock_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%run%field_interval > 0.0_wp .and. self%t >= self%next_frame - same_time
-  end function frame_due
-
-  !> Is a restart file due now? (The one at the end of a run is not asked for here.)
-  pure function restart_due(self) result(yes)
-    class(clock_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%run%restart_interval > 0.0_wp .and. self%step > 0 &
-      .and. self%t >= self%next_restart - same_time
-  end function restart_due
-
-  !> A due row has been written.
-  pure subroutine row_done(self)
-    class(clock_t), intent(inout) :: self
-
-    self%n_rows = self%n_rows + 1
-    self%next_row = next_multiple(self%run%history_interval, self%t)
-  end subroutine row_done
-
-  !> A due frame has been written.
-  pure subroutine frame_done(self)
-    class(clock_t), intent(inout) :: self
-
-    self%n_frames = self%n_frames + 1
-    self%next_frame = next_multiple(self%run%field_interval, self%t)
-  end subroutine frame_done
-
-  !> A due restart file is about to be written: what is in it counts it as written.
-  pure subroutine restart_done(self)
-    class(clock_t), intent(inout) :: self
-
-    self%next_restart = next_multiple(self%run%restart_interval, self%t)
-  end subroutine restart_done
 
 end module clock_m

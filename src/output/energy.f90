@@ -51,12 +51,18 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(energy_t), intent(out) :: self
-    integer :: b, d
+    integer :: b, s, d
     real(wp) :: g
 
     self%known = case%fluid%surface_tension <= 0.0_wp &
-                 .and. .not. any(abs(grid%side_velocity) > 0.0_wp) .and. only_top_is_open() &
+                 .and. .not. any(abs(grid%side_velocity) > 0.0_wp) &
                  .and. .not. any(grid%periodic .and. abs(case%fluid%gravity) > 0.0_wp)
+    do d = 1, 3
+      do s = 1, 2   ! only the top is open, and no stream comes in
+        self%known = self%known .and. .not. grid%is_exit(case%fluid%gravity, s, d) &
+                     .and. (is_wall(grid%side(s, d)) .or. .not. gives_velocity(grid%side(s, d)))
+      end do
+    end do
     do b = 1, blocks%n
       if (.not. (blocks%fixed(b) .or. blocks%handling(b)%lowering_speed > 0.0_wp)) cycle
       self%known = self%known .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
@@ -71,22 +77,6 @@ contains
       if (.not. blocks%fixed(b)) self%floor = self%floor + floor_fall*blocks%mass(b)*g &
         *blocks%shapes(blocks%shape(b))%radius
     end do
-  contains
-    !> Is the side against gravity the only one that lets fluid through, and none a stream?
-    logical function only_top_is_open()
-      integer :: e, s
-      logical :: top
-
-      only_top_is_open = .true.
-      do e = 1, 3
-        do s = 1, 2
-          if (grid%periodic(e) .or. is_wall(grid%side(s, e))) cycle
-          top = e == maxloc(abs(case%fluid%gravity), 1) &
-                .and. merge(case%fluid%gravity(e), -case%fluid%gravity(e), s == 1) > 0.0_wp
-          only_top_is_open = only_top_is_open .and. top .and. .not. gives_velocity(grid%side(s, e))
-        end do
-      end do
-    end function only_top_is_open
   end subroutine energy_init
 
   !> What is there before the first step. What the liquid sets free when it comes to lie level

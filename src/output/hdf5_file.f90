@@ -15,9 +15,16 @@ module hdf5_file_m
   use hdf5_handle_m, only: h5_handle_t
   implicit none
   private
-  public :: h5_file_t
+  public :: h5_file_t, dataset_t
 
   integer, parameter :: max_rank = 5
+
+  type :: dataset_t
+    character(:), allocatable :: name, units
+    integer(hid_t) :: type = -1                  !! of its elements, in memory
+    integer(hid_t) :: id = -1                    !! while it is open
+    integer(hsize_t), allocatable :: extent(:)   !! x fastest; h5py shows the reverse
+  end type dataset_t
 
   !> A file with its datasets.
   type, extends(h5_handle_t) :: h5_file_t
@@ -27,7 +34,7 @@ module hdf5_file_m
     generic :: store => store_reals, store_integers, store_texts
     generic :: read => read_reals, read_integers, read_texts
     procedure :: store_wide_integers, shape_of, new_blocks, write_block, read_block
-    procedure :: new_dataset, find, select   ! for columns
+    procedure :: new_dataset, find, write_part, read_part   ! for columns
   end type h5_file_t
 
 contains
@@ -37,23 +44,19 @@ contains
   subroutine store_reals(self, name, units, a, extent)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    real(wp), intent(in) :: a(:)                 !! its elements in a row
-    integer, intent(in), optional :: extent(:)   !! its shape, else it is a row
-    real(wp), target :: copy(max(1, size(a)))
+    real(wp), intent(in), target, contiguous :: a(:)   !! its elements in a row
+    integer, intent(in), optional :: extent(:)         !! its shape, else it is a row
 
-    copy(:size(a)) = a
-    call put(self, name, units, H5T_NATIVE_DOUBLE, shape_or(extent, size(a)), c_loc(copy))
+    call put(self, name, units, H5T_NATIVE_DOUBLE, shape_or(extent, size(a)), c_loc(a))
   end subroutine store_reals
 
   subroutine store_integers(self, name, units, a, extent)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in) :: a(:)
+    integer, intent(in), target, contiguous :: a(:)
     integer, intent(in), optional :: extent(:)
-    integer, target :: copy(max(1, size(a)))
 
-    copy(:size(a)) = a
-    call put(self, name, units, H5T_NATIVE_INTEGER, shape_or(extent, size(a)), c_loc(copy))
+    call put(self, name, units, H5T_NATIVE_INTEGER, shape_or(extent, size(a)), c_loc(a))
   end subroutine store_integers
 
   !> Integers of 64 bits, the kind that VTK uses for numbers of points and cells.
@@ -61,11 +64,11 @@ contains
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer, intent(in) :: a(:)
-    integer(i8), target :: copy(max(1, size(a)))
+    integer(i8), target :: wide(size(a))
 
-    copy(:size(a)) = int(a, i8)
-    call put(self, name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [size(a, kind=hsize_t)], &
-             c_loc(copy))
+    wide = int(a, i8)
+    call put(self, name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(a, kind=hsize_t), &
+             c_loc(wide))
   end subroutine store_wide_integers
 
   !> Texts, each as long as the longest of them.
@@ -115,67 +118,60 @@ contains
     integer(hid_t), intent(in) :: type
     integer(hsize_t), intent(in) :: extent(:)
     type(c_ptr), intent(in) :: data
-    integer(hid_t) :: id
+    type(dataset_t) :: dataset
     integer :: status
 
+    dataset = dataset_t(name, units, type, extent=extent)
     if (self%has(name)) then
-      call h5dopen_f(self%id, name, id, status)
+      call h5dopen_f(self%id, name, dataset%id, status)
       call self%check(status, 'open '//name)
     else
-      call self%new_dataset(name, units, type, extent, H5P_DEFAULT_F, id)
+      call self%new_dataset(dataset, H5P_DEFAULT_F)
     end if
     if (self%info /= 0) return
     if (product(extent) > 0 .and. (is_root() .or. .not. self%shared)) then
-      call h5dwrite_f(id, type, data, status)
+      call h5dwrite_f(dataset%id, type, data, status)
       call self%check(status, 'write '//name)
     end if
-    call h5dclose_f(id, status)
+    call h5dclose_f(dataset%id, status)
   end subroutine put
 
   !> Create a dataset of any type, with its unit; `list` of a growing one says how it is cut.
-  subroutine new_dataset(self, name, units, type, extent, list, id)
+  subroutine new_dataset(self, dataset, list)
     class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer(hid_t), intent(in) :: type
-    integer(hsize_t), intent(in) :: extent(:)
+    class(dataset_t), intent(inout) :: dataset
     integer(hid_t), intent(in) :: list     !! H5P_DEFAULT_F: the shape never changes
-    integer(hid_t), intent(out) :: id
-    integer(hsize_t) :: largest(size(extent))
+    integer(hsize_t) :: largest(size(dataset%extent))
     integer(hid_t) :: space
     integer :: status
 
-    id = -1
     if (self%info /= 0) return
-    largest = extent
+    largest = dataset%extent
     if (list /= H5P_DEFAULT_F) then
-      where (extent == 0) largest = H5S_UNLIMITED_F
+      where (dataset%extent == 0) largest = H5S_UNLIMITED_F
     end if
-    call h5screate_simple_f(size(extent), extent, space, status, largest)
-    call h5dcreate_f(self%id, name, type, space, id, status, list)
-    call self%check(status, 'create '//name)
+    call h5screate_simple_f(size(largest), dataset%extent, space, status, largest)
+    call h5dcreate_f(self%id, dataset%name, dataset%type, space, dataset%id, status, list)
+    call self%check(status, 'create '//dataset%name)
     if (self%info == 0) call h5sclose_f(space, status)
-    call self%attribute(name, 'units', units)
+    call self%attribute(dataset%name, 'units', dataset%units)
   end subroutine new_dataset
 
   !> All elements of a dataset, in a row; their number must be right.
   subroutine read_reals(self, name, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
-    real(wp), intent(inout) :: a(:)
-    real(wp), target :: copy(max(1, size(a)))
+    real(wp), intent(inout), target, contiguous :: a(:)
 
-    call get(self, name, H5T_NATIVE_DOUBLE, size(a), c_loc(copy))
-    if (self%info == 0) a = copy(:size(a))
+    call get(self, name, H5T_NATIVE_DOUBLE, size(a), c_loc(a))
   end subroutine read_reals
 
   subroutine read_integers(self, name, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
-    integer, intent(inout) :: a(:)
-    integer, target :: copy(max(1, size(a)))
+    integer, intent(inout), target, contiguous :: a(:)
 
-    call get(self, name, H5T_NATIVE_INTEGER, size(a), c_loc(copy))
-    if (self%info == 0) a = copy(:size(a))
+    call get(self, name, H5T_NATIVE_INTEGER, size(a), c_loc(a))
   end subroutine read_integers
 
   !> All texts of a dataset, cut or filled to the length of `a`.
@@ -208,59 +204,55 @@ contains
     integer(hid_t), intent(in) :: type
     integer, intent(in) :: n
     type(c_ptr), intent(in) :: data
-    integer(hsize_t), allocatable :: extent(:)
-    integer(hid_t) :: id
+    type(dataset_t) :: dataset
     type(c_ptr) :: there
     integer :: status
 
-    call self%find(name, type, id, extent)
+    dataset = dataset_t(name, '', type)
+    call self%find(dataset)
     if (self%info /= 0) return
-    if (product(extent) /= int(n, hsize_t)) then
+    if (product(dataset%extent) /= int(n, hsize_t)) then
       call self%fail(name//' has another size than this case needs')
     else if (n > 0) then
       there = data
-      call h5dread_f(id, type, there, status)
+      call h5dread_f(dataset%id, type, there, status)
       call self%check(status, 'read '//name)
     end if
-    call h5dclose_f(id, status)
+    call h5dclose_f(dataset%id, status)
   end subroutine get
 
   !> Open a dataset. Elements larger than any number and than what is to be read are refused: in a
   !! damaged file they make the library read past its buffers.
-  subroutine find(self, name, type, id, extent)
+  subroutine find(self, dataset)
     class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(hid_t), intent(in) :: type                        !! of what is to be read
-    integer(hid_t), intent(out) :: id
-    integer(hsize_t), allocatable, intent(out) :: extent(:)   !! x fastest; h5py shows the reverse
+    class(dataset_t), intent(inout) :: dataset   !! its name and type say what is to be read
     integer(size_t), parameter :: largest_number = 16   ! [B]
     integer(hsize_t) :: now(max_rank), largest(max_rank)
     integer(size_t) :: in_file, asked
     integer(hid_t) :: space, file_type
     integer :: status, rank
 
-    id = -1
-    extent = [integer(hsize_t) ::]
+    dataset%extent = [integer(hsize_t) ::]
     if (self%info /= 0) return
-    call h5dopen_f(self%id, name, id, status)
-    call self%check(status, 'open '//name)
+    call h5dopen_f(self%id, dataset%name, dataset%id, status)
+    call self%check(status, 'open '//dataset%name)
     if (self%info /= 0) return
-    call h5dget_space_f(id, space, status)
+    call h5dget_space_f(dataset%id, space, status)
     call h5sget_simple_extent_ndims_f(space, rank, status)
-    call self%check(merge(status, -1, rank <= max_rank), 'open '//name)
+    call self%check(merge(status, -1, rank <= max_rank), 'open '//dataset%name)
     if (self%info /= 0) return
     call h5sget_simple_extent_dims_f(space, now(:rank), largest(:rank), status)
-    call self%check(status, 'open '//name)
-    extent = now(:rank)
+    call self%check(status, 'open '//dataset%name)
+    dataset%extent = now(:rank)
     call h5sclose_f(space, status)
-    call h5dget_type_f(id, file_type, status)
-    call self%check(status, 'read '//name)
+    call h5dget_type_f(dataset%id, file_type, status)
+    call self%check(status, 'read '//dataset%name)
     if (self%info /= 0) return
     call h5tget_size_f(file_type, in_file, status)
-    call h5tget_size_f(type, asked, status)
+    call h5tget_size_f(dataset%type, asked, status)
     call h5tclose_f(file_type, status)
     if (in_file <= max(asked, largest_number)) return
-    call self%fail(name//' has elements of a size that no number has')
+    call self%fail(dataset%name//' has elements of a size that no number has')
   end subroutine find
 
   !> Extents of a dataset, x fastest.
@@ -268,13 +260,13 @@ contains
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
     integer, allocatable, intent(out) :: found(:)
-    integer(hsize_t), allocatable :: extent(:)
-    integer(hid_t) :: id
+    type(dataset_t) :: dataset
     integer :: status
 
-    call self%find(name, H5T_NATIVE_DOUBLE, id, extent)
-    found = int(min(extent, int(huge(0), hsize_t)))
-    if (self%info == 0) call h5dclose_f(id, status)
+    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
+    call self%find(dataset)
+    found = int(min(dataset%extent, int(huge(0), hsize_t)))
+    if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine shape_of
 
   !> Create a dataset of doubles that all processes fill block by block; zero where none is written.
@@ -282,15 +274,17 @@ contains
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer, intent(in) :: extent(:)
-    integer(hid_t) :: id, list
+    type(dataset_t) :: dataset
+    integer(hid_t) :: list
     integer :: status
 
     if (self%info /= 0) return
     call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
     call h5pset_fill_time_f(list, H5D_FILL_TIME_ALLOC_F, status)
-    call self%new_dataset(name, units, H5T_NATIVE_DOUBLE, int(extent, hsize_t), list, id)
+    dataset = dataset_t(name, units, H5T_NATIVE_DOUBLE, extent=int(extent, hsize_t))
+    call self%new_dataset(dataset, list)
     call h5pclose_f(list, status)
-    if (self%info == 0) call h5dclose_f(id, status)
+    if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine new_blocks
 
   !> Write the block `first : first + extent - 1` of a dataset of `new_blocks`; all processes
@@ -300,19 +294,16 @@ contains
     character(*), intent(in) :: name
     integer, intent(in) :: first(:), extent(:)
     real(wp), intent(in), target, contiguous :: a(:)   !! the block's elements in a row
-    integer(hid_t) :: id, there, here
+    type(dataset_t) :: dataset
     integer :: status
 
     if (self%info /= 0) return
-    call h5dopen_f(self%id, name, id, status)
+    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
+    call h5dopen_f(self%id, name, dataset%id, status)
     call self%check(status, 'open '//name)
-    call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
-    if (self%info /= 0) return
-    call h5dwrite_f(id, H5T_NATIVE_DOUBLE, c_loc(a), status, here, there, self%transfer)
-    call self%check(status, 'write '//name)
-    call h5sclose_f(there, status)
-    call h5sclose_f(here, status)
-    call h5dclose_f(id, status)
+    call self%write_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a), &
+                         self%transfer)
+    if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine write_block
 
   !> Read the block `first : first + extent - 1` of a dataset of reals.
@@ -321,40 +312,69 @@ contains
     character(*), intent(in) :: name
     integer, intent(in) :: first(:), extent(:)
     real(wp), intent(inout), target, contiguous :: a(:)
-    integer(hsize_t), allocatable :: whole(:)
-    integer(hid_t) :: id, there, here
-    type(c_ptr) :: data
+    type(dataset_t) :: dataset
     integer :: status
 
-    call self%find(name, H5T_NATIVE_DOUBLE, id, whole)
-    call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
-    if (self%info /= 0) return
-    data = c_loc(a)
-    call h5dread_f(id, H5T_NATIVE_DOUBLE, data, status, here, there)
-    call self%check(status, 'read '//name)
-    call h5sclose_f(there, status)
-    call h5sclose_f(here, status)
-    call h5dclose_f(id, status)
+    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
+    call self%find(dataset)
+    call self%read_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a))
+    if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine read_block
 
-  !> Select a block of a dataset and describe it in memory.
-  subroutine select(self, name, id, first, extent, there, here)
+  !> Write a block of a dataset that is open.
+  subroutine write_part(self, dataset, first, extent, data, transfer)
     class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer(hid_t), intent(in) :: id
-    integer(hsize_t), intent(in) :: first(:)    !! from 0
+    class(dataset_t), intent(in) :: dataset
+    integer(hsize_t), intent(in) :: first(:)   !! from 0
     integer(hsize_t), intent(in) :: extent(:)
-    integer(hid_t), intent(out) :: there, here  !! in the file, in memory
+    type(c_ptr), intent(in) :: data
+    integer(hid_t), intent(in) :: transfer     !! H5P_DEFAULT_F: this process alone
+    integer(hid_t) :: there, here
+    integer :: status
+
+    call select(self, dataset, first, extent, there, here)
+    if (self%info /= 0) return
+    call h5dwrite_f(dataset%id, dataset%type, data, status, here, there, transfer)
+    call self%check(status, 'write '//dataset%name)
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+  end subroutine write_part
+
+  !> Read a block of a dataset that is open.
+  subroutine read_part(self, dataset, first, extent, data)
+    class(h5_file_t), intent(inout) :: self
+    class(dataset_t), intent(in) :: dataset
+    integer(hsize_t), intent(in) :: first(:), extent(:)
+    type(c_ptr), intent(in) :: data
+    integer(hid_t) :: there, here
+    type(c_ptr) :: into
+    integer :: status
+
+    call select(self, dataset, first, extent, there, here)
+    if (self%info /= 0) return
+    into = data
+    call h5dread_f(dataset%id, dataset%type, into, status, here, there)
+    call self%check(status, 'read '//dataset%name)
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+  end subroutine read_part
+
+  !> Select a block of a dataset and describe it in memory.
+  subroutine select(self, dataset, first, extent, there, here)
+    class(h5_file_t), intent(inout) :: self
+    class(dataset_t), intent(in) :: dataset
+    integer(hsize_t), intent(in) :: first(:), extent(:)
+    integer(hid_t), intent(out) :: there, here   !! in the file, in memory
     integer :: status
 
     there = -1
     here = -1
     if (self%info /= 0) return
-    call h5dget_space_f(id, there, status)
+    call h5dget_space_f(dataset%id, there, status)
     call h5sselect_hyperslab_f(there, H5S_SELECT_SET_F, first, extent, status)
-    call self%check(status, 'select a part of '//name)
+    call self%check(status, 'select a part of '//dataset%name)
     call h5screate_simple_f(size(extent), extent, here, status)
-    call self%check(status, 'select a part of '//name)
+    call self%check(status, 'select a part of '//dataset%name)
   end subroutine select
 
 end module hdf5_file_m

@@ -1,8 +1,8 @@
 !> Starting HDF5 the way this program needs it, and the reason of its last failure in plain words.
 module hdf5_reason_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_char, c_null_char, c_funptr, &
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_null_char, c_funptr, &
     c_funloc, c_loc, c_f_pointer, c_null_ptr, c_associated
-  use c_library_m, only: c_setenv
+  use c_library_m, only: c_setenv, text_at
   use hdf5, only: h5open_f, h5eset_auto_f, h5dont_atexit_f
   implicit none
   private
@@ -75,17 +75,11 @@ contains
     type(c_ptr), value :: data
     integer(c_int) :: status
     character(longest_reason), pointer :: found
-    character(kind=c_char), pointer :: letter(:)
-    integer :: i
 
     status = 0
     if (level /= 0 .or. .not. c_associated(record%description)) return
     call c_f_pointer(data, found)
-    call c_f_pointer(record%description, letter, [longest_reason])
-    do i = 1, longest_reason
-      if (letter(i) == c_null_char) exit
-      found(i:i) = letter(i)
-    end do
+    found = text_at(record%description)
   end function keep_innermost
 
 end module hdf5_reason_m

@@ -13,17 +13,15 @@ module output_m
   use block_record_m, only: begin_row
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
+  use result_file_m, only: result_file_t
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
-  use diagnostics_m, only: step_report_t, quantity_t, make_row
+  use diagnostics_m, only: step_report_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
-    write_row, close_run_file
-  use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, &
-    continue_field_file, write_field_frame
-  use write_vtkhdf_m, only: block_file_t, create_block_file, reopen_block_file, &
-    continue_block_file, write_block_frame
+    close_run_file
+  use write_vtkhdf_m, only: field_file_t, block_file_t
   use restart_m, only: write_restart
-  use progress_m, only: progress_t, progress_start, line_due, store_clips, write_line, &
+  use progress_m, only: progress_t, progress_start, line_interval, store_clips, write_line, &
     write_summary
   implicit none
   private
@@ -39,10 +37,7 @@ module output_m
     character(:), allocatable :: message     !! what the error was
     character(:), allocatable :: folder
     character(:), allocatable :: restart_file   !! the newest, empty: none yet
-    character(:), allocatable, private :: text, parameters   !! of the case
     type(fluid_t), private :: properties     !! of the fluid
-    logical, private :: quiet = .false.      !! no table
-    logical, private :: fluid = .false.      !! there is one
     logical, private :: fields = .false., surfaces = .false. !! these files are written
     integer, private :: next_restart = 1     !! file to write next
     !> Step of the last of each; -1: none yet.
@@ -67,19 +62,20 @@ contains
     type(bed_t), intent(in) :: bed
     type(output_t), intent(out) :: output
     character(:), allocatable :: what
+    logical :: fluid
 
     output%message = ''
     output%restart_file = options%restart
     output%phase = timer('output')
     output%restart_phase = timer('restart files')
     call tic(output%phase)
-    output%text = case%text
-    output%parameters = parameters
+    output%run_file%text = case%text
+    output%run_file%parameters = parameters
     output%properties = case%fluid
-    output%quiet = options%quiet
-    output%fluid = allocated(state%flow%u)
-    output%fields = output%fluid .and. case%run%field_interval > 0.0_wp
+    fluid = allocated(state%flow%u)
+    output%fields = fluid .and. case%run%field_interval > 0.0_wp
     output%surfaces = state%blocks%n > 0 .and. case%run%field_interval > 0.0_wp
+    call set_row(state, step_report_t(), output)
     if (len(options%restart) > 0) then
       call continue_files(options, state, output)
     else
@@ -92,7 +88,7 @@ contains
       call close_files(output)
       call output%lock%release()
     end if
-    call progress_start(options%quiet, output%fluid, state%light%on, state%clock, output%progress)
+    call progress_start(options%quiet, fluid, state%light%on, state%clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
 
@@ -102,13 +98,11 @@ contains
     type(options_t), intent(in) :: options
     character(:), allocatable, intent(out) :: what, path
 
-    if (len(options%output) > 0) then
-      what = '--output'
-      path = trim(options%output)
-    else
-      what = '&run output'
-      path = trim(case%run%output)
-    end if
+    what = '--output'
+    path = trim(options%output)
+    if (len(options%output) > 0) return
+    what = '&run output'
+    path = trim(case%run%output)
   end subroutine name_folder
 
   !> Note what forbids the folder of a run that starts anew, nothing is changed. All processes call.
@@ -125,20 +119,28 @@ contains
     if (code /= exit_ok) call problems%add_message(message)
   end subroutine check_output
 
+  !> The row of this moment.
+  subroutine set_row(state, report, output)
+    type(run_state_t), intent(in) :: state
+    type(step_report_t), intent(in) :: report
+    type(output_t), intent(inout) :: output
+
+    output%run_file%row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
+      - output%progress%began, state, report)
+  end subroutine set_row
+
   subroutine create_files(state, bed, output)
     type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
     type(output_t), intent(inout) :: output
 
-    call create_run_file(output%folder//'/'//run_name, output%text, output%parameters, state, &
-      bed, make_row(output%properties, 0.0_wp, state, step_report_t()), &
-      output%run_file)
-    if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', 'note', &
-      not_resolved)
-    if (output%fields) call create_field_file(output%folder//'/'//field_name, state, &
-      output%field_file)
-    if (output%surfaces) call create_block_file(output%folder//'/'//block_name, state%blocks, &
-      output%block_file)
+    associate (here => output%folder//'/')
+      call create_run_file(here//run_name, state, bed, output%run_file)
+      if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', &
+        'note', not_resolved)
+      if (output%fields) call output%field_file%create(here//field_name, .true., state)
+      if (output%surfaces) call output%block_file%create(here//block_name, .false., state)
+    end associate
     call check_files(output)
     call watch_folder(output)
     if (output%code == exit_ok) return
@@ -166,11 +168,11 @@ contains
   subroutine close_files(output, exit_code)
     type(output_t), intent(inout) :: output
     integer, intent(in), optional :: exit_code   !! of a run that ends; else it could not begin
-    integer :: taken
+    logical :: taken
 
-    taken = merge(1, 0, output%lock%taken)
+    taken = output%lock%taken
     call broadcast(taken)
-    if (taken == 1) return
+    if (taken) return
     if (present(exit_code)) call close_run_file(output%run_file, exit_code)
     call output%run_file%file%close()
     call output%field_file%file%close()
@@ -182,63 +184,54 @@ contains
     type(options_t), intent(in) :: options
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
-    integer :: up_to_date(2)
+    logical :: fluid, blocks, row_there, frame_there
 
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//'/'//run_name, state%clock, state%blocks, &
-      make_row(output%properties, 0.0_wp, state, step_report_t()), output%run_file)
-    if (state%clock%n_frames > 0) then
-      if (output%fluid) call reopen_field_file(output%folder//'/'//field_name, state, &
-        output%field_file)
-      if (state%blocks%n > 0) call reopen_block_file(output%folder//'/'//block_name, state%blocks, &
-                                                     state%clock, output%block_file)
-    end if
-    call check_files(output)
-    call watch_folder(output)
-    if (output%code /= exit_ok) return
-    call continue_run_file(output%text, output%parameters, output%run_file)
-    if (output%fluid) call continue_fields(state, output)
-    if (state%blocks%n > 0) call continue_surfaces(state, output)
-    up_to_date = 0
-    if (output%run_file%up_to_date) up_to_date(1) = 1
-    if (output%field_file%up_to_date .or. output%block_file%up_to_date) up_to_date(2) = 1
-    call broadcast(up_to_date)   ! only the root process knows about its own files
-    if (up_to_date(1) == 1) output%row_step = state%clock%step
-    if (up_to_date(2) == 1) output%frame_step = state%clock%step
+    fluid = allocated(state%flow%u)
+    blocks = state%blocks%n > 0
+    associate (here => output%folder//'/', n => state%clock%frames%n, lock => output%lock)
+      call reopen_run_file(here//run_name, state, output%run_file)
+      if (fluid .and. n > 0) call output%field_file%reopen(here//field_name, .true., n, state)
+      if (blocks .and. n > 0) call output%block_file%reopen(here//block_name, .false., n, state)
+      call check_files(output)
+      call watch_folder(output)
+      if (output%code /= exit_ok) return
+      call continue_run_file(state%blocks, output%run_file)
+      if (fluid) call continue_frames(lock, here, field_name, output%fields, .true., state, &
+                                      output%field_file)
+      if (blocks) call continue_frames(lock, here, block_name, output%surfaces, .false., state, &
+                                       output%block_file)
+    end associate
+    row_there = output%run_file%up_to_date
+    frame_there = output%field_file%up_to_date .or. output%block_file%up_to_date
+    call broadcast(row_there)   ! only the root process knows about its own files
+    call broadcast(frame_there)
+    if (row_there) output%row_step = state%clock%step
+    if (frame_there) output%frame_step = state%clock%step
     if (index(options%restart, restart_name(1)) > 0) output%next_restart = 2
     output%restart_step = state%clock%step
   end subroutine continue_files
 
-  !> Go on with the frames of the fluid; without any so far the file begins now, and where no more
-  !! are wanted it only loses the later ones.
-  subroutine continue_fields(state, output)
+  !> Go on with frames; without any so far the file begins now, and where no more are wanted it only
+  !! loses the later ones.
+  subroutine continue_frames(lock, here, name, wanted, shared, state, file)
+    type(folder_lock_t), intent(in) :: lock
+    character(*), intent(in) :: here, name   !! folder, file
+    logical, intent(in) :: wanted            !! more frames
+    logical, intent(in) :: shared            !! all processes write them
     type(run_state_t), intent(in) :: state
-    type(output_t), intent(inout) :: output
+    class(result_file_t), intent(inout) :: file
 
-    if (state%clock%n_frames > 0) then
-      call continue_field_file(output%field_file)
-      if (.not. output%fields) call output%field_file%file%close()
-    else if (output%fields) then
-      if (is_root()) call output%lock%remove(field_name)   ! a killed run may have left it
-      call create_field_file(output%folder//'/'//field_name, state, output%field_file)
+    if (state%clock%frames%n > 0) then
+      call file%drop(file%rows)
+      if (.not. wanted) call file%file%close()
+    else if (wanted) then
+      if (is_root()) call lock%remove(name)   ! a killed run may have left it
+      call file%create(here//name, shared, state)
     end if
-  end subroutine continue_fields
-
-  !> The same for the frames of the blocks.
-  subroutine continue_surfaces(state, output)
-    type(run_state_t), intent(in) :: state
-    type(output_t), intent(inout) :: output
-
-    if (state%clock%n_frames > 0) then
-      call continue_block_file(output%block_file)
-      if (.not. output%surfaces) call output%block_file%file%close()
-    else if (output%surfaces) then
-      if (is_root()) call output%lock%remove(block_name)
-      call create_block_file(output%folder//'/'//block_name, state%blocks, output%block_file)
-    end if
-  end subroutine continue_surfaces
+  end subroutine continue_frames
 
   !> Keep the first error of any of the files; all processes call.
   subroutine check_files(output)
@@ -275,7 +268,6 @@ contains
     type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
-    type(quantity_t), allocatable :: row(:)
     logical :: row_wanted, frame_wanted, line_wanted
     real(wp) :: now   ! [s]
 
@@ -283,65 +275,45 @@ contains
     call tic(output%phase)
     output%progress%warnings = output%progress%warnings + report%warnings
     call store_clips(state%clock%t, report%inertia_clips, output%progress)
-    row_wanted = state%clock%row_due() .and. output%row_step /= state%clock%step
-    frame_wanted = state%clock%frame_due() .and. output%frame_step /= state%clock%step
-    line_wanted = line_due(output%progress)
-    line_wanted = line_wanted .or. frame_wanted
-    if (row_wanted .or. frame_wanted) then
-      call watch_folder(output)
-      if (output%code /= exit_ok) return
-    else
-      call share_outcome(output%quiet, line_wanted)
-    end if
-    if (row_wanted .or. line_wanted) then
-      row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, state, report)
-    end if
+    row_wanted = state%clock%rows%due(state%clock%t) .and. output%row_step /= state%clock%step
+    frame_wanted = state%clock%frames%due(state%clock%t) .and. output%frame_step /= state%clock%step
+    now = wall_clock()
+    line_wanted = frame_wanted .or. (output%progress%shown &   ! on the root process
+                                     .and. now - output%progress%last_line >= line_interval)
+    if (row_wanted .or. frame_wanted) call watch_folder(output)
+    if (output%code /= exit_ok) return
+    if (row_wanted .or. line_wanted) call set_row(state, report, output)
     if (row_wanted) then
-      call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
-      call state%clock%row_done()
+      call output%run_file%append(state%clock%rows%n, state)
+      call state%clock%rows%done(state%clock%t)
       call begin_row(state%blocks)
       output%row_step = state%clock%step
     end if
     if (frame_wanted) then
       call write_frames(state, output)
-      call state%clock%frame_done()
+      call state%clock%frames%done(state%clock%t)
     end if
-    if (line_wanted) call write_line(output%progress, state%clock, row, state%blocks)
-    now = wall_clock()
+    if (line_wanted) call write_line(output%progress, state%clock, output%run_file%row, &
+      state%blocks)
     if (is_root() .and. now > output%next_look) then   ! rows may be far apart
       call output%lock%verify(output%code, output%message)
       output%next_look = now + look_interval
     end if
     call check_files(output)
     call toc(output%phase)
-    if (state%clock%restart_due()) then
-      call state%clock%restart_done()
+    if (state%clock%step > 0 .and. state%clock%restarts%due(state%clock%t)) then
+      call state%clock%restarts%done(state%clock%t)   ! what is in it counts it as written
       call save_state(state, output)
     end if
   end subroutine write_due_output
-
-  !> Whether a line is wanted depends on the clock of the root process.
-  subroutine share_outcome(quiet, wanted)
-    logical, intent(in) :: quiet
-    logical, intent(inout) :: wanted
-    integer :: flag
-
-    if (quiet) return
-    flag = merge(1, 0, wanted)
-    call broadcast(flag)
-    wanted = flag == 1
-  end subroutine share_outcome
 
   !> Write the frames of this moment as the next ones; the caller counts them if they were due.
   subroutine write_frames(state, output)
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    associate (n => state%clock%n_frames, t => state%clock%t)
-      if (output%fields) call write_field_frame(output%field_file, n, state)
-      if (output%surfaces) call write_block_frame(output%block_file, n, t, state%blocks)
-    end associate
+    if (output%fields) call output%field_file%append(state%clock%frames%n, state)
+    if (output%surfaces) call output%block_file%append(state%clock%frames%n, state)
     output%frame_step = state%clock%step
   end subroutine write_frames
 
@@ -359,8 +331,8 @@ contains
     associate (name => restart_name(output%next_restart), lock => output%lock)
       part = name//'.part'
       if (is_root()) call lock%remove(part)   ! of a run that was killed
-      call write_restart(output%folder//'/'//part, output%text, output%parameters, state, info, &
-        message)
+      call write_restart(output%folder//'/'//part, output%run_file%text, &
+        output%run_file%parameters, state, info, message)
       if (is_root() .and. info == 0) call lock%rename(part, name, info, message)
       call broadcast(info)
       if (info == 0) output%restart_file = output%folder//'/'//name
@@ -381,27 +353,27 @@ contains
     type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
-    type(quantity_t), allocatable :: row(:)
     integer :: code
     logical :: row_wanted, frame_wanted
 
     call watch_folder(output)
     if (output%code == exit_ok) then
-      row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, state, report)
+      call set_row(state, report, output)
       row_wanted = output%row_step /= state%clock%step
       frame_wanted = output%frame_step /= state%clock%step
-      if (row_wanted) call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
+      if (row_wanted) call output%run_file%append(state%clock%rows%n, state)
       if (frame_wanted) call write_frames(state, output)
       call check_files(output)
     end if
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
-      if (row_wanted .and. state%clock%row_due()) then
-        call state%clock%row_done()
+      if (row_wanted .and. state%clock%rows%due(state%clock%t)) then
+        call state%clock%rows%done(state%clock%t)
         call begin_row(state%blocks)
       end if
-      if (frame_wanted .and. state%clock%frame_due()) call state%clock%frame_done()
-      call write_line(output%progress, state%clock, row, state%blocks)
+      if (frame_wanted .and. state%clock%frames%due(state%clock%t)) then
+        call state%clock%frames%done(state%clock%t)
+      end if
+      call write_line(output%progress, state%clock, output%run_file%row, state%blocks)
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)

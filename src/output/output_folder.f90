@@ -40,7 +40,7 @@ contains
           //' characters, must have at most '//to_text(longest_path)
       else if (.not. exists(path)) then
         continue
-      else if (.not. is_folder(path)) then
+      else if (.not. exists(path//'/.')) then
         message = what//' = '''//path//''': is a file, must be a folder'
       else if (.not. is_free(path)) then
         message = what//' = '''//path//''': the folder is not empty and holds no run.h5, ' &
@@ -154,10 +154,11 @@ contains
 
     code = exit_ok
     message = ''
-    from = folder_of(restart)
+    from = '.'
+    if (index(restart, '/') > 0) from = trimmed(restart(:index(restart, '/', back=.true.)))
     path = from
     if (len(output) > 0) path = trimmed(output)
-    if (is_same(path, from)) then
+    if (whole_path(path) == whole_path(from)) then
       if (is_root()) call lock%take(path, code, message)
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
@@ -200,15 +201,6 @@ contains
     call broadcast(message)
   end subroutine share_outcome
 
-  !> The folder that holds a file.
-  pure function folder_of(file) result(path)
-    character(*), intent(in) :: file
-    character(:), allocatable :: path
-
-    path = '.'
-    if (index(file, '/') > 0) path = trimmed(file(:index(file, '/', back=.true.)))
-  end function folder_of
-
   !> A path without the slashes and blanks at its end.
   pure function trimmed(path) result(short)
     character(*), intent(in) :: path
@@ -216,15 +208,6 @@ contains
 
     short = path(:max(verify(path, '/ ', back=.true.), min(1, len(path))))
   end function trimmed
-
-  !> Do two paths lead to the same place?
-  function is_same(one, other) result(yes)
-    character(*), intent(in) :: one, other
-    logical :: yes
-
-    yes = one == other
-    if (.not. yes) yes = whole_path(one) == whole_path(other)
-  end function is_same
 
   !> The path from the root without links and dots; the path as it is where there is nothing.
   function whole_path(path) result(whole)
@@ -242,13 +225,6 @@ contains
 
     yes = c_access(path//c_null_char, 0_c_int) == 0
   end function exists
-
-  function is_folder(path) result(yes)
-    character(*), intent(in) :: path
-    logical :: yes
-
-    yes = exists(path//'/.')
-  end function is_folder
 
   !> May a folder be used: empty, or to be renamed away?
   function is_free(path) result(yes)

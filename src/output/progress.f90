@@ -12,10 +12,10 @@ module progress_m
   use diagnostics_m, only: quantity_t, value_of
   implicit none
   private
-  public :: progress_t, progress_start, line_due, store_clips, write_line, write_summary
+  public :: progress_t, progress_start, store_clips, write_line, write_summary
 
   integer, parameter :: lines_per_header = 25
-  real(wp), parameter :: line_interval = 1.0_wp   !! of wall time [s]
+  real(wp), parameter, public :: line_interval = 1.0_wp   !! of wall time [s]
 
   type :: progress_t
     logical :: shown = .false.            !! on this process, and not forbidden by --quiet
@@ -50,15 +50,6 @@ contains
       //'cores, export GOMP_SPINCOUNT=1000 first, or take --threads 1', self)
   end subroutine progress_start
 
-  !> Has enough time passed for another line?
-  function line_due(self) result(yes)
-    type(progress_t), intent(in) :: self
-    logical :: yes
-
-    yes = wall_clock() - self%last_line >= line_interval
-    yes = yes .and. self%shown
-  end function line_due
-
   !> Count what the limits of added inertia cut in a step, and warn of the first that do.
   subroutine store_clips(time, clips, self)
     real(wp), intent(in) :: time    !! [s]
@@ -84,7 +75,7 @@ contains
     type(quantity_t), intent(in) :: row(:)
     type(blocks_t), intent(in) :: blocks
     character(160) :: line
-    integer :: released, moving
+    integer :: released
 
     if (.not. self%shown .or. clock%step == self%last_step) return
     self%last_step = clock%step
@@ -92,7 +83,6 @@ contains
     self%lines = self%lines + 1
     self%last_line = wall_clock()
     released = count(blocks%status == let_go)
-    moving = count_moving(clock%run%rest_speed, blocks)
     if (self%fluid) then
       write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, of('dt'), &
         of('cfl'), of('divergence_max'), nint(of('pressure_passes')), nint(of('solver_iterations'))
@@ -101,7 +91,8 @@ contains
         nint(of('substeps')), of('contact_courant_max')
     end if
     write (line(len_trim(line) + 1:), '(a11, i8, i8, f13.4)') to_text(released)//'/' &
-      //to_text(blocks%n), moving, count(blocks%asleep), 1.0e3_wp*of('max_overlap')
+      //to_text(blocks%n), count(blocks%speed > clock%run%rest_speed), count(blocks%asleep), &
+      1.0e3_wp*of('max_overlap')
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') of('liquid_volume_drift')
     call say(trim(line)//time_left(self, clock), self)
   contains
@@ -137,15 +128,6 @@ contains
       line = clock_columns//'  substeps  Courant'//block_columns//'  time left'
     end if
   end function header
-
-  !> Free blocks that are not at rest.
-  pure function count_moving(rest_speed, blocks) result(n)
-    real(wp), intent(in) :: rest_speed   !! [m/s]
-    type(blocks_t), intent(in) :: blocks
-    integer :: n
-
-    n = count(blocks%speed > rest_speed)
-  end function count_moving
 
   !> Wall time to the end at the mean speed so far, as h:mm:ss.
   function time_left(self, clock) result(text)

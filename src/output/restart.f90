@@ -24,7 +24,6 @@ module restart_m
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
-  use clock_m, only: clock_resume
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use state_m, only: list_state, state_groups
@@ -105,7 +104,11 @@ contains
       message = '&run t_end: the restart file is already past it'
       return
     end if
-    call clock_resume(state%clock)
+    associate (clock => state%clock)
+      call clock%rows%plan(clock%t)
+      call clock%frames%plan(clock%t)
+      call clock%restarts%plan(clock%t)
+    end associate
   end subroutine read_restart
 
   !> Where to go on when a restart file is no good: with the one written before or after it.

@@ -33,8 +33,8 @@ contains
       call list%add('/clock/dt', 's', clock%dt)
       call list%add('/clock/rest_began', 's', clock%rest_began)
       call list%add('/clock/step', clock%step)
-      call list%add('/clock/n_rows', clock%n_rows)
-      call list%add('/clock/n_frames', clock%n_frames)
+      call list%add('/clock/n_rows', clock%rows%n)
+      call list%add('/clock/n_frames', clock%frames%n)
     end associate
     associate (energy => state%energy)
       call list%add('/energy/put_in', 'J', energy%put_in)

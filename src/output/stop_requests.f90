@@ -8,7 +8,7 @@ module stop_requests_m
   use folder_lock_m, only: folder_lock_t, stop_name
   implicit none
   private
-  public :: stop_requests_t, watch_for_stop, stop_asked
+  public :: stop_requests_t, stop_asked
 
   real(wp), parameter :: look_interval = 0.5_wp   !! wall time between two looks at the folder [s]
   real(wp), parameter :: steps_ahead = 3.0_wp     !! slowest steps that still have to fit in
@@ -17,64 +17,45 @@ module stop_requests_m
 
   type :: stop_requests_t
     character(:), allocatable :: reason      !! why the run ends, on the root process
-    type(folder_lock_t), private :: folder   !! of the results
-    real(wp), private :: max_wall = 0.0_wp   !! time given [s], 0: no end
-    real(wp), private :: began = 0.0_wp      !! when the time given began
-    real(wp), private :: last = 0.0_wp       !! when the last step ended
-    real(wp), private :: slowest = 0.0_wp    !! longest step so far [s]
-    real(wp), private :: next_look = 0.0_wp
+    type(folder_lock_t) :: folder            !! of the results, on the root process
+    real(wp) :: max_wall = 0.0_wp            !! time given [s], 0: no end
+    real(wp) :: began = 0.0_wp               !! when the time given began
+    real(wp) :: last = 0.0_wp                !! when the last step ended
+    real(wp) :: slowest = 0.0_wp             !! longest step so far [s]
+    real(wp) :: next_look = 0.0_wp
   end type stop_requests_t
 
 contains
-
-  !> Begin to watch; the time given runs from `began`.
-  subroutine watch_for_stop(folder, max_wall, began, self)
-    type(folder_lock_t), intent(in) :: folder   !! of the results, on the root process
-    real(wp), intent(in) :: max_wall     !! [s], 0: no end
-    real(wp), intent(in) :: began        !! wall clock when the program began [s]
-    type(stop_requests_t), intent(out) :: self
-
-    self%reason = ''
-    self%folder = folder
-    self%max_wall = max_wall
-    self%began = began
-    self%last = wall_clock()
-  end subroutine watch_for_stop
 
   !> After a step: the signal that ends the run, 0 for none. A file or the time count as SIGTERM.
   !! All processes call and get the same answer.
   function stop_asked(self) result(number)
     type(stop_requests_t), intent(inout) :: self
     integer :: number
-    real(wp) :: of_any(1)
+    real(wp) :: of_any(1), now, kept
 
     of_any = real(signal_caught(), wp)
     if (of_any(1) > 0.0_wp) self%reason = 'stopped by a signal'
     if (is_root() .and. .not. of_any(1) > 0.0_wp) then
-      call look_around(self)
+      now = wall_clock()
+      self%slowest = max(self%slowest, now - self%last)
+      self%last = now
+      if (self%max_wall > 0.0_wp) then
+        kept = steps_ahead*self%slowest + min(closing, closing_share*self%max_wall)
+        if (now - self%began + kept >= self%max_wall) self%reason = 'stopped as --max-wall asks'
+      end if
+      if (now >= self%next_look) then
+        self%next_look = now + look_interval
+        if (self%folder%has(stop_name)) then   ! it has served and goes
+          call self%folder%remove(stop_name)
+          self%reason = "stopped by the file '"//self%folder%folder//'/'//stop_name &
+            //"', now removed"
+        end if
+      end if
       if (len(self%reason) > 0) of_any = real(signal_terminate, wp)
     end if
     call global_max(of_any)
     number = nint(of_any(1))
   end function stop_asked
-
-  !> Is there the file, or is the time over? The file has served then and goes.
-  subroutine look_around(self)
-    type(stop_requests_t), intent(inout) :: self
-    real(wp) :: now, kept
-
-    now = wall_clock()
-    self%slowest = max(self%slowest, now - self%last)
-    self%last = now
-    if (self%max_wall > 0.0_wp) then
-      kept = steps_ahead*self%slowest + min(closing, closing_share*self%max_wall)
-      if (now - self%began + kept >= self%max_wall) self%reason = 'stopped as --max-wall asks'
-    end if
-    if (now < self%next_look) return
-    self%next_look = now + look_interval
-    if (.not. self%folder%has(stop_name)) return
-    call self%folder%remove(stop_name)
-    self%reason = "stopped by the file '"//self%folder%folder//'/'//stop_name//"', now removed"
-  end subroutine look_around
 
 end module stop_requests_m

@@ -14,15 +14,15 @@ module table_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_associated
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND
-  use hdf5, only: h5dread_f, h5dset_extent_f, h5dwrite_f, h5dget_create_plist_f, h5pclose_f
+  use hdf5, only: h5dset_extent_f, h5dget_create_plist_f, h5pclose_f
   use hdf5, only: h5pcreate_f, h5pget_chunk_f, h5pget_nfilters_f, h5pset_alloc_time_f
   use hdf5, only: h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_value_f, h5pset_fletcher32_f
-  use hdf5, only: h5pset_shuffle_f, h5sclose_f, h5tget_size_f
-  use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5P_DATASET_CREATE_F, H5T_NATIVE_DOUBLE
+  use hdf5, only: h5pset_shuffle_f, h5tget_size_f
+  use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, H5T_NATIVE_DOUBLE
   use hdf5, only: H5T_NATIVE_INTEGER, H5T_NATIVE_REAL
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
-  use hdf5_file_m, only: h5_file_t
+  use hdf5_file_m, only: h5_file_t, dataset_t
   use file_space_m, only: bytes_for_change, bytes_for_chunks
   implicit none
   private
@@ -33,14 +33,11 @@ module table_m
   integer, parameter :: field_bytes = 2**18    !! of a compressed field
   integer, parameter :: min_chunk_rows = 8
 
-  type :: column_t
-    character(:), allocatable :: name, units
-    integer(hid_t) :: type = -1        !! of its elements, in memory and in the file
+  !> A dataset whose last index is that of the row.
+  type, extends(dataset_t) :: column_t
     integer, allocatable :: row(:)     !! shape of a row; empty: a number
     integer :: per_row = 1             !! rows of the column in a row of the table
     integer :: layers = 0              !! of a chunk: it is compressed; 0: it is not
-    integer(hid_t) :: id = -1
-    integer(hsize_t), allocatable :: extent(:)   !! of the dataset; the last is the number of rows
     integer(hsize_t), allocatable :: chunk(:)    !! shape of the pieces that are stored
   end type column_t
 
@@ -49,7 +46,7 @@ module table_m
     integer :: rows = 0
     integer :: chunk_bytes = 2**14     !! of a column that is not compressed
     logical :: up_to_date = .false.    !! a run that goes on has a row of its very start
-    integer, private :: mode = creating
+    integer :: mode = creating         !! what listing the columns does
     integer, private :: at = 0         !! column that was listed last
     type(column_t), allocatable, private :: list(:)
   contains
@@ -96,7 +93,8 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target :: x
 
-    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, [integer ::]), c_loc(x))
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
+                            row=[integer ::]), c_loc(x))
   end subroutine number
 
   !> Numbers, one of each block.
@@ -105,7 +103,8 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: x(:)
 
-    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, shape(x)), c_loc(x))
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
+                            row=shape(x)), c_loc(x))
   end subroutine numbers
 
   !> Vectors, one of each block.
@@ -114,7 +113,8 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: x(:, :)   !! (components, blocks)
 
-    call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, shape(x)), c_loc(x))
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
+                            row=shape(x)), c_loc(x))
   end subroutine vectors
 
   !> Integers, one of each block.
@@ -123,7 +123,8 @@ contains
     character(*), intent(in) :: name, units
     integer, intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name, units, H5T_NATIVE_INTEGER, shape(n)), c_loc(n))
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_INTEGER, &
+                            row=shape(n)), c_loc(n))
   end subroutine integers
 
   !> An integer of 64 bits, the kind that VTK uses for numbers of points and cells.
@@ -132,8 +133,8 @@ contains
     character(*), intent(in) :: name, units
     integer(i8), intent(in), target :: n
 
-    call self%next(column_t(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [integer ::]), &
-                   c_loc(n))
+    call self%next(column_t(name=name, units=units, type=h5kind_to_type(i8, H5_INTEGER_KIND), &
+                            row=[integer ::]), c_loc(n))
   end subroutine wide_number
 
   subroutine wide_numbers(self, name, units, n)
@@ -141,7 +142,8 @@ contains
     character(*), intent(in) :: name, units
     integer(i8), intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(n)), c_loc(n))
+    call self%next(column_t(name=name, units=units, type=h5kind_to_type(i8, H5_INTEGER_KIND), &
+                            row=shape(n)), c_loc(n))
   end subroutine wide_numbers
 
   !> Vectors of points, which follow one another in the file; compressed.
@@ -154,9 +156,11 @@ contains
 
     if (single) then
       allocate (short(3, size(x, 2)), source=real(x, sp))
-      call self%next(column_t(name, units, H5T_NATIVE_REAL, [3], size(x, 2), 3), c_loc(short))
+      call self%next(column_t(name=name, units=units, type=H5T_NATIVE_REAL, row=[3], &
+                              per_row=size(x, 2), layers=3), c_loc(short))
     else
-      call self%next(column_t(name, units, H5T_NATIVE_DOUBLE, [3], size(x, 2), 3), c_loc(x))
+      call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
+                              row=[3], per_row=size(x, 2), layers=3), c_loc(x))
     end if
   end subroutine points
 
@@ -166,7 +170,8 @@ contains
     character(*), intent(in) :: name, units
     integer, intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name, units, H5T_NATIVE_INTEGER, [integer ::], size(n)), c_loc(n))
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_INTEGER, &
+                            row=[integer ::], per_row=size(n)), c_loc(n))
   end subroutine cells
 
   !> Numbers of the cells of a grid in single precision, of which this process gives a block;
@@ -177,21 +182,15 @@ contains
     integer, intent(in) :: whole(:)              !! shape of the field
     integer, intent(in) :: first(:), extent(:)   !! of the block
     real(sp), intent(in), target, contiguous :: a(:)   !! its elements in a row
-    integer(hid_t) :: there, here
-    integer :: status, layers
+    integer :: layers
 
     layers = max(1, field_bytes/(4*product(whole(:size(whole) - 1))))
-    call self%next(column_t(name, units, H5T_NATIVE_REAL, whole, 1, &
-                            min(layers, whole(size(whole)))), c_null_ptr)
+    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_REAL, &
+                            row=whole, layers=min(layers, whole(size(whole)))), c_null_ptr)
     if (self%mode /= appending .or. self%file%info /= 0) return
     associate (file => self%file, column => self%list(self%at))
-      call file%select(name, column%id, [int(first - 1, hsize_t), last_row(column)], &
-                       [int(extent, hsize_t), 1_hsize_t], there, here)
-      if (file%info /= 0) return
-      call h5dwrite_f(column%id, column%type, c_loc(a), status, here, there, file%transfer)
-      call file%check(status, 'write '//name)
-      call h5sclose_f(there, status)
-      call h5sclose_f(here, status)
+      call file%write_part(column, [int(first - 1, hsize_t), last_row(column)], &
+                           [int(extent, hsize_t), 1_hsize_t], c_loc(a), file%transfer)
     end associate
   end subroutine field
 
@@ -227,7 +226,7 @@ contains
     end if
     call file%check(minval(status), 'create '//column%name)
     call set_fill(file, column, list)
-    call file%new_dataset(column%name, column%units, column%type, column%extent, list, column%id)
+    call file%new_dataset(column, list)
     call h5pclose_f(list, status(1))
   end subroutine create_column
 
@@ -261,7 +260,7 @@ contains
     integer(hid_t) :: list
     integer :: status, filters
 
-    call file%find(column%name, column%type, column%id, column%extent)
+    call file%find(column)
     if (file%info /= 0) return
     allocate (column%chunk, mold=column%extent)
     call h5dget_create_plist_f(column%id, list, status)
@@ -294,8 +293,6 @@ contains
     type(column_t), intent(inout) :: column
     type(c_ptr), intent(in) :: data   !! null: the caller writes it
     integer(hsize_t) :: first(size(column%extent)), extent(size(column%extent))
-    integer(hid_t) :: there, here
-    integer :: status
 
     first = 0
     first(size(first)) = last_row(column) + 1
@@ -303,12 +300,7 @@ contains
     call resize(file, column, last_row(column) + 1 + column%per_row)
     if (.not. c_associated(data) .or. product(extent) == 0) return
     if (file%shared .and. .not. is_root()) return
-    call file%select(column%name, column%id, first, extent, there, here)
-    if (file%info /= 0) return
-    call h5dwrite_f(column%id, column%type, data, status, here, there)
-    call file%check(status, 'write '//column%name)
-    call h5sclose_f(there, status)
-    call h5sclose_f(here, status)
+    call file%write_part(column, first, extent, data, H5P_DEFAULT_F)
   end subroutine append
 
   !> Rows that a run keeps which goes on, those that it has counted, and one more if that one is of
@@ -381,9 +373,7 @@ contains
     integer, intent(in) :: row
     real(wp), intent(inout), target, contiguous :: a(:)
     integer(hsize_t), allocatable :: first(:), extent(:)
-    integer(hid_t) :: there, here
-    type(c_ptr) :: data
-    integer :: c, status
+    integer :: c
 
     if (self%file%info /= 0 .or. size(a) == 0) return
     do c = 1, size(self%list)
@@ -392,13 +382,7 @@ contains
         extent = [column%extent(:size(column%extent) - 1), 1_hsize_t]
         first = 0*extent
         first(size(first)) = int(row - 1, hsize_t)
-        call self%file%select(name, column%id, first, extent, there, here)
-        if (self%file%info /= 0) return
-        data = c_loc(a)
-        call h5dread_f(column%id, H5T_NATIVE_DOUBLE, data, status, here, there)
-        call self%file%check(status, 'read '//name)
-        call h5sclose_f(there, status)
-        call h5sclose_f(here, status)
+        call self%file%read_part(column, first, extent, c_loc(a))
       end associate
     end do
   end subroutine read_row

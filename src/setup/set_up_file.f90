@@ -15,8 +15,8 @@ module set_up_file_m
   use rigid_body_m, only: blocks_t, blocks_init, drift
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
-  use diagnostics_m, only: step_report_t, quantity_t, make_row
-  use write_run_m, only: run_file_t, create_run_file, write_row, close_run_file
+  use diagnostics_m, only: step_report_t, make_row
+  use write_run_m, only: run_file_t, create_run_file, close_run_file
   implicit none
   private
   public :: write_set_up
@@ -37,21 +37,22 @@ contains
     type(run_state_t) :: state
     type(step_report_t) :: report
     type(run_file_t) :: file
-    type(quantity_t), allocatable :: row(:)
     integer :: i, n
 
     call grid_init(case%grid, case%boundary, state%grid)
     call clock_init(case%run, state%clock)
     call blocks_init(case, shapes, state%blocks)
-    call create_run_file(path, case%text, parameters, state, bed, &
-      make_row(case%fluid, 0.0_wp, state, report), file)
+    file%text = case%text
+    file%parameters = parameters
+    file%row = make_row(case%fluid, 0.0_wp, state, report)
+    call create_run_file(path, state, bed, file)
     call write_places(case, state%blocks, file)
     n = 0
     if (any(moves(state%blocks))) n = n_poses
     state%blocks%present = moves(state%blocks)   ! nothing else is moved below
     do i = 0, n
-      row = make_row(case%fluid, 0.0_wp, state, report)
-      call write_row(file, i, row, state%blocks)
+      file%row = make_row(case%fluid, 0.0_wp, state, report)
+      call file%append(i, state)
       call drift(case%run%t_end/n_poses, state%blocks)
       state%clock%t = (i + 1)*case%run%t_end/n_poses
     end do

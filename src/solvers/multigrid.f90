@@ -17,7 +17,7 @@ module multigrid_m
   use linear_operator_m, only: preconditioner_t
   use multigrid_level_m, only: level_t, level_init, set_equations, coarsen_coefficients, &
     load_line, unload_line, relax_plane, restrict_plane, prolong_plane, fill_halo
-  use parallel_m, only: nproc, global_max, global_min, gather_all
+  use parallel_m, only: nproc, global_max, gather_all
   implicit none
   private
   public :: multigrid_t
@@ -160,14 +160,14 @@ contains
     type(level_t), intent(in) :: level
     integer, intent(in) :: lo(3), hi(3)   !! block of this process
     logical :: can
-    real(wp) :: yes(1)
+    real(wp) :: no(1)
 
     can = modulo(lo(1), 2) == 1 .and. all(modulo(lo, 2) == 1 .or. .not. level%paired) &
       .and. all(hi - lo > 1 .or. .not. level%paired)
     can = can .and. .not. (level%wraps(1) .and. modulo(level%n(1), 2) == 1)
-    yes = merge(1.0_wp, 0.0_wp, can)
-    call global_min(yes)
-    can = yes(1) > 0.0_wp
+    no = merge(0.0_wp, 1.0_wp, can)
+    call global_max(no)
+    can = no(1) <= 0.0_wp
   end function can_be_in_parts
 
   !> Is level l put together from the blocks of many processes?

@@ -51,8 +51,8 @@ contains
     s%clock%t = 1.25_wp
     s%clock%dt = 0.01_wp
     s%clock%step = 130
-    s%clock%n_rows = 131
-    s%clock%n_frames = 13
+    s%clock%rows%n = 131
+    s%clock%frames%n = 13
     call fill_cells(start + 0.1_wp, s%grid, 3, s%flow%u)
     call fill_cells(start + 0.2_wp, s%grid, 1, s%flow%p)
     call fill_cells(start + 0.3_wp, s%grid, 3, s%flow%uf)

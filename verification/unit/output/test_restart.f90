@@ -137,10 +137,10 @@ contains
       //new_line('a') &
       //'  field_interval = 2'//new_line('a')//'/'//new_line('a')
     s%clock%t_end = 9.0_wp
-    s%clock%run%history_interval = 0.5_wp
+    s%clock%rows%interval = 0.5_wp
     call read_sample(s, info, message)
     call check('t_end and intervals may change', info, 0)
-    call check('the next row is due after the restart', s%clock%next_row, 1.5_wp, 1.0e-14_wp)
+    call check('the next row is due after the restart', s%clock%rows%next, 1.5_wp, 1.0e-14_wp)
     s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.02' &
       //new_line('a') &
       //'/'//new_line('a')

@@ -64,8 +64,8 @@ contains
     case (1); name = '/clock/t'; s%clock%t = nearest(s%clock%t, 1.0_wp)
     case (2); name = '/clock/dt'; s%clock%dt = nearest(s%clock%dt, 1.0_wp)
     case (3); name = '/clock/step'; s%clock%step = s%clock%step + 1
-    case (4); name = '/clock/n_rows'; s%clock%n_rows = s%clock%n_rows + 1
-    case (5); name = '/clock/n_frames'; s%clock%n_frames = s%clock%n_frames + 1
+    case (4); name = '/clock/n_rows'; s%clock%rows%n = s%clock%rows%n + 1
+    case (5); name = '/clock/n_frames'; s%clock%frames%n = s%clock%frames%n + 1
     case (6); name = '/clock/rest_began'; s%clock%rest_began = 0.0_wp
     case (7); name = '/flow/u'; call touch(s%flow%u(at(1), at(2), at(3), 2))
     case (8); name = '/flow/p'; call touch(s%flow%p(top(1), top(2), top(3)))
