@@ -38,17 +38,17 @@ contains
     !$omp parallel do private(d, c) schedule(dynamic, 64)
     do m = 1, merged%n
       do d = 1, 3
-        call shorten(merged%cell(:, m), d, merged%body(m))
+        call shorten(merged%cell(:, m), d)
         c = merged%cell(:, m) + unit_step(:, d)
         if (c(d) > grid%hi(d) + 1) cycle
-        if (merged%number(c(1), c(2), c(3)) == 0) call shorten(c, d, merged%body(m))
+        if (merged%number(c(1), c(2), c(3)) == 0) call shorten(c, d)
       end do
     end do
   contains
-    !> The lower face of cell f in direction d, at the wall of body b.
-    subroutine shorten(f, d, b)
-      integer, intent(in) :: f(3), d, b
-      integer :: low(3)
+    !> The lower face of cell f in direction d, of which f or the cell below is a wall cell.
+    subroutine shorten(f, d)
+      integer, intent(in) :: f(3), d
+      integer :: low(3), m_low, m_up
       real(wp) :: nu, past(3), time
 
       if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
@@ -56,8 +56,10 @@ contains
       low = f - unit_step(:, d)
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
         if (.not. (a%in_liquid(p, q, r) .and. a%in_liquid(i, j, k))) return
-        past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
-          - velocity_in_cell(grid, bodies, b, f)
+        m_low = merge(merged%number(p, q, r), merged%number(i, j, k), merged%number(p, q, r) > 0)
+        m_up = merge(merged%number(i, j, k), merged%number(p, q, r), merged%number(i, j, k) > 0)
+        past = face_mean(flow%u(p, q, r, :) - velocity_in_cell(grid, bodies, merged%body(m_low), &
+          low), flow%u(i, j, k, :) - velocity_in_cell(grid, bodies, merged%body(m_up), f))
         time = rhie_chow_time(dt, dt*sum(abs(past)/grid%h))
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))

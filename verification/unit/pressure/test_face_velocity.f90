@@ -101,7 +101,7 @@ contains
     integer :: low(3)
 
     low = f - unit_step(:, d)
-    shortened = stream(d) + time(0.1_wp*(f - 0.5_wp))*(a%face(f(1), f(2), f(3), d) &
+    shortened = stream(d) + time(0.05_wp*(low + f - 1.0_wp))*(a%face(f(1), f(2), f(3), d) &
       - 0.5_wp*(a%cell(low(1), low(2), low(3), d) + a%cell(f(1), f(2), f(3), d)))
   end function shortened
 
