@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tools"))
 
 from measures.checks import Checks, sound  # noqa: E402
+from micstools.cases import settings  # noqa: E402
 from micstools.reading.reader import Run  # noqa: E402
 
 CASES = ROOT / "verification" / "cases"
@@ -101,7 +102,8 @@ def prepare(name: str, work: Path) -> list[Path]:
         old.unlink()
     script = CASES / name / "prepare.py"
     if script.exists():
-        subprocess.run([sys.executable, str(script)], cwd=work, check=True)
+        paths = {"PYTHONPATH": str(ROOT / "tools")}
+        subprocess.run([sys.executable, str(script)], cwd=work, check=True, env=os.environ | paths)
     return sorted([*(CASES / name).glob("*.nml"), *work.glob("*.nml")])
 
 
@@ -136,9 +138,14 @@ def quick(plans: list[Planned]) -> list[Planned]:
 
 def changed(text: str, groups: dict[str, Any]) -> str:
     """A case file with other values: for each group a table, or a list of tables for a group that
-    is repeated, one for each occurrence in order. A group that is not there is added."""
+    is repeated, one for each occurrence in order. A group that is not there is added; those of a
+    name whose values are False are taken out."""
+    for name, start, end in reversed(settings.groups(text)):
+        text = text[:start] + text[end:] if groups.get(name) is False else text
     case = f90nml.reads(text)
     for group, values in groups.items():
+        if values is False:
+            continue
         present = case.get(group, [])
         present = list(present) if isinstance(present, list) else [present]
         for k, table in enumerate(values if isinstance(values, list) else [values]):

@@ -94,7 +94,7 @@ def test_same_bits_over_a_bed(tmp_path: Path) -> None:
     prepare("bed", tmp_path)
     short = {"run": {"t_end": 0.15, "field_interval": 0.05}}
     case = tmp_path / "short.nml"
-    case.write_text(changed((tmp_path / "drop.nml").read_text(), short))
+    case.write_text(changed((CASES / "bed" / "drop.nml").read_text(), short))
     run(case, tmp_path / "alone", ALONE)
     run(case, tmp_path / "shared", ranks(2))
     assert differences(tmp_path / "alone", tmp_path / "shared") == []

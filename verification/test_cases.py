@@ -81,3 +81,4 @@ def test_variants_change_only_what_they_name() -> None:
     assert "length = 1.0, 1.0, 1.0" in found
     assert [found.count(f"x = {n}") for n in (1, 2, 5, 6)] == [1, 0, 1, 1]
     assert "y = 3" in found
+    assert "body" not in changed(text, {"body": False})

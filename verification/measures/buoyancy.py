@@ -19,6 +19,11 @@ def displaced(body: Placed, level: float, liquid: float, gas: float) -> tuple[fl
     return (liquid - gas) * volume + gas * body.shape.volume, (liquid - gas) * about
 
 
+def densities(run: Run) -> tuple[float, float]:
+    """Of liquid and gas [kg/m3]."""
+    return float(run.value("fluid", "liquid_density")), float(run.value("fluid", "gas_density"))
+
+
 def buoyancy_rows(run: Run, checks: Checks) -> None:
     """Compare force and torque of the last row with the geometric ones, body by body.
 
@@ -26,16 +31,12 @@ def buoyancy_rows(run: Run, checks: Checks) -> None:
     for the torque.
     """
     level = float(run.value("fluid", "water_level"))
-    densities = (
-        float(run.value("fluid", "liquid_density")),
-        float(run.value("fluid", "gas_density")),
-    )
     for k, body in present_bodies(run, len(run.bodies.time) - 1).items():
         heights = body.points[:, 2]
         crossing = heights.min() < level < heights.max()
         band = CROSSING_BAND if crossing else SUBMERGED_BAND
         where = "crossing" if crossing else ("in water" if heights.max() <= level else "in gas")
-        mass, moment = displaced(body, level, *densities)
+        mass, moment = displaced(body, level, *densities(run))
         weight = mass * float(np.linalg.norm(run.gravity))
         name = f"{run.folder.name}: body {k + 1} ({body.shape.name}, {where})"
         force, torque = run.bodies.fluid_force[-1, k], run.bodies.fluid_torque[-1, k]

@@ -86,8 +86,8 @@ class Checks:
     title: str
     results: list[Result] = field(default_factory=list)
     routine: list[Result] = field(default_factory=list)  # what holds in any case, see `sound`
-    figures: list[Figure] = field(default_factory=list)
-    studies: list[Study] = field(default_factory=list)
+    _figures: dict[str, Figure] = field(default_factory=dict)
+    _points: dict[str, tuple[str, float, dict[float, float]]] = field(default_factory=dict)
 
     @property
     def failed(self) -> int:
@@ -132,13 +132,22 @@ class Checks:
         reference: Curves | None = None,
         smooth: bool = False,
     ) -> None:
-        """Draw curves, named x and y values, of ours and of the reference."""
+        """Draw curves, named x and y values, of ours and of the reference, in one picture for each
+        title."""
 
         def arrays(curves: Curves) -> dict[str, tuple[Array, Array]]:
             pairs = curves.items()
             return {name: (np.asarray(a, float), np.asarray(b, float)) for name, (a, b) in pairs}
 
-        self.figures.append(Figure(title, x, y, arrays(ours), arrays(reference or {}), smooth))
+        if title not in self._figures:
+            self._figures[title] = Figure(title, x, y, {}, {}, smooth)
+        self._figures[title].ours.update(arrays(ours))
+        self._figures[title].reference.update(arrays(reference or {}))
+
+    @property
+    def figures(self) -> list[Figure]:
+        """In the order of their first curves."""
+        return list(self._figures.values())
 
     def study(
         self,
@@ -147,24 +156,26 @@ class Checks:
         reference: float = float("nan"),
         resolution: str = "cells",
     ) -> None:
-        """A quantity over the number of cells; draws the errors and finds the observed order."""
-        rows = sorted(values.items())
-        if len(rows) > 1:
-            cells, found = zip(*rows, strict=True)
-            self.studies.append(Study(quantity, resolution, cells, found, reference))
+        """A quantity over the number of cells, of one run or of several; draws the errors and finds
+        the observed order."""
+        known = self._points.setdefault(quantity, (resolution, reference, {}))
+        known[2].update(values)
+
+    @property
+    def studies(self) -> list[Study]:
+        """Those of at least two resolutions."""
+        found = []
+        for quantity, (resolution, reference, values) in self._points.items():
+            cells = tuple(sorted(values))
+            at = tuple(values[n] for n in cells)
+            found += [Study(quantity, resolution, cells, at, reference)] if len(cells) > 1 else []
+        return found
 
     def text(self) -> str:
         """The tables."""
         heads = ("quantity", "ours", "reference", "error", "band", "")
         rows = [
-            (
-                r.quantity,
-                r.ours,
-                r.reference,
-                r.error,
-                r.band,
-                r.mark,
-            )
+            (r.quantity, r.ours, r.reference, r.error, r.band, r.mark)
             for r in self.results + self.routine
         ]
         widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(6)]

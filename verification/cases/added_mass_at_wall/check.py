@@ -1,6 +1,7 @@
 """Added mass of blocks that touch a wall, along its normal."""
 
 from measures.checks import Checks
+from measures.facts import added_mass
 from micstools.reading.reader import Run
 
 QUICK = ("cells_08", "hexapod_*")
@@ -8,24 +9,13 @@ TOUCHING = 0.803  # of the displaced mass: a sphere, Lamb, Hydrodynamics, art. 9
 """As `src/coupling/added_mass.f90` takes it for every shape."""
 
 
-def added_mass(run: Run) -> float:
-    """From the acceleration of the run's last row: a = g (1 - s)/(s + Ca)."""
-    b = run.bodies
-    ratio = run.shapes[b.shape[0]].density / float(run.value("fluid", "liquid_density"))
-    return 9.81 * (1 - ratio) / float(b.velocity[-1, 0, 2] / b.time[-1]) - ratio
-
-
 def check(runs: list[Run], checks: Checks) -> None:
     """The sphere against potential flow; of the others how far they are from a sphere."""
-    spheres: dict[float, float] = {}
     for run in runs:
-        shape, found = run.bodies.shape[0], added_mass(run)
+        shape, found, cells = run.bodies.shape[0], added_mass(run), 0.06 / run.grid.spacing[0]
         sphere = shape == "sphere"
+        name = f"{shape}, {cells:g} cells per 60 mm: added mass / displaced mass"
+        checks.close(name, found, TOUCHING, 0.02 if sphere else 0.25, sphere)
         if sphere:
-            spheres[round(0.06 / float(run.grid.spacing[0]), 1)] = found
-        cells = f"{0.06 / float(run.grid.spacing[0]):g} cells per 60 mm"
-        band = 0.02 if sphere else 0.25
-        checks.close(
-            f"{shape}, {cells}: added mass / displaced mass", found, TOUCHING, band, sphere
-        )
-    checks.study("added mass of a sphere at a wall", spheres, TOUCHING, "cells per diameter")
+            title = "added mass of a sphere at a wall"
+            checks.study(title, {round(float(cells), 1): found}, TOUCHING, "cells per diameter")

@@ -26,8 +26,8 @@ def check(runs: list[Run], checks: Checks) -> None:
         creep = np.linalg.norm(creep, axis=1) / (0.25 * end)
         for what, part in PARTS.items():
             name = f"{run.folder.name}, {what}:"
-            checks.below(f"{name} way [mm]", 1e3 * float(moved[part].max()), WAY)
-            checks.below(f"{name} tilt [deg]", float(turned[part].max()), TILT)
-            checks.below(f"{name} creep [m/s]", float(creep[part].max()), CREEP)
-        held = int(b.contacts[-1, 21])
+            checks.below(f"{name} way [mm]", 1e3 * moved[part].max(), WAY)
+            checks.below(f"{name} tilt [deg]", turned[part].max(), TILT)
+            checks.below(f"{name} creep [m/s]", creep[part].max(), CREEP)
+        held = b.contacts[-1, 21]
         checks.true("the hooked hexapod touches one body", held == 1, f"{held}")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from measures import facts
 from measures.checks import Checks
 from micstools.reading.reader import Run
 
@@ -33,9 +34,7 @@ Values = NDArray[np.float64]
 
 def table(name: str) -> Values:
     """The rows of a reference file; time and value are its last two columns."""
-    lines = Path(__file__).with_name(name).read_text().splitlines()
-    rows = [line.split(",") for line in lines if line[0] not in "#T" and not line.startswith("a_m")]
-    return np.array([[float(part) for part in row[-2:]] for row in rows])
+    return facts.table(__file__, name).iloc[:, -2:].to_numpy(float)
 
 
 def history(run: Run) -> tuple[Values, Values, Values]:
@@ -97,7 +96,6 @@ def worst(time: Values, value: Values, reference: Values, scale: Values, shift: 
 
 def check(runs: list[Run], checks: Checks) -> None:
     """One shift for all times of a run makes up for the gate; it fits the front."""
-    ours, measured = {}, {}
     for run in runs:
         name = run.folder.name
         base, ratio = SIZES[name]
@@ -122,16 +120,11 @@ def check(runs: list[Run], checks: Checks) -> None:
         checks.close(f"{name}: impulse over exact force at the start", ratio_force, 1.0, FORCE_BAND)
         instants, total = energy(run)
         free = total[instants <= seconds[front < length - 0.5].max()]
-        checks.within(
-            f"{name}: energy over that of the start",
-            float(free[np.argmax(np.abs(free - 1.0))]),
-            1.0 - ENERGY_LOSS,
-            1.0 + ENERGY_GAIN,
-        )
+        farthest, bounds = free[np.argmax(np.abs(free - 1.0))], (1 - ENERGY_LOSS, 1 + ENERGY_GAIN)
+        checks.within(f"{name}: energy over that of the start", farthest, *bounds)
         if name == "martin_moyce_1":
             drop = table("B1_martin_moyce_height.csv")
             drop = drop[drop[:, 0] <= time[-1] - LARGEST_SHIFT]
             error = worst(time, height / base, drop, np.ones(len(drop)), shift)
             checks.below(f"{name}: largest error of the height", error, HEIGHT_BAND)
-        ours[name], measured[name] = (time - shift, front), (rows[:, 0], rows[:, 1])
-    checks.figure("front", "T", "Z", ours, measured)
+        checks.figure("front", "T", "Z", {name: (time - shift, front)}, {name: rows.T})

@@ -4,7 +4,7 @@ import numpy as np
 
 from measures.checks import Checks
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import place, volume_in_box
+from micstools.shapes.geometry import rotation_matrix, volume_in_box
 
 VARIES = ("contact friction", "contact wall_friction")  # none in `smooth`
 ENERGY_BAND = 1e-3
@@ -29,10 +29,9 @@ def energy(run: Run, checks: Checks, scale: float) -> None:
     gain = float((total - total[0]).max() / scale)
     name = run.folder.name
     checks.below(f"{name}: energy above the initial", max(gain, 0.0), ENERGY_BAND)
-    back = float((np.maximum.accumulate(total[::-1])[::-1] - total).max() / scale)
+    back = (np.maximum.accumulate(total[::-1])[::-1] - total).max() / scale
     checks.below(f"{name}: energy that comes back later", back, ENERGY_BAND, counts=False)
-    deepest = 1e3 * float(s.max_overlap.max())
-    checks.below(f"{name}: largest overlap [mm]", deepest, 1.0, counts=False)
+    checks.below(f"{name}: largest overlap [mm]", 1e3 * s.max_overlap.max(), 1.0, counts=False)
     checks.figure(f"energy, {name}", "t [s]", "J", {"total": (s.time, total)})
 
 
@@ -41,16 +40,13 @@ def momentum(run: Run, checks: Checks) -> None:
     b = run.bodies
     linear = b.mass[:, None] * b.velocity
     inertia = np.array([run.shapes[name].inertia for name in b.shape])
-    spin = np.empty_like(linear)
-    for row in range(len(b.time)):
-        turns = [place(np.eye(3), np.zeros(3), q).T for q in b.quaternion[row]]
-        for k, turn in enumerate(turns):
-            spin[row, k] = turn @ inertia[k] @ turn.T @ b.angular_velocity[row, k]
+    turn = rotation_matrix(b.quaternion)
+    spin = np.einsum("tkij,kjl,tkml,tkm->tki", turn, inertia, turn, b.angular_velocity)
     about = np.cross(b.position - 1.0, linear) + spin
     for what, each in (("momentum", linear), ("angular momentum", about)):
         total = each.sum(axis=1)
-        scale = float(np.linalg.norm(each, axis=2).sum(axis=1).max())
-        drift = float(np.linalg.norm(total - total[0], axis=1).max()) / scale
+        scale = np.linalg.norm(each, axis=2).sum(axis=1).max()
+        drift = np.linalg.norm(total - total[0], axis=1).max() / scale
         checks.below(f"{run.folder.name}: {what}", drift, ROUND_OFF)
     touched = int((b.contacts.max(axis=0) > 0).sum())
     checks.true(f"{run.folder.name}: blocks that touch", touched > b.n / 2, f"{touched} of {b.n}")
@@ -63,22 +59,17 @@ def balance(run: Run, checks: Checks) -> None:
     change = b.mass[:, None] * np.diff(b.velocity, axis=0) / dt
     rest = change - b.contact_force[1:] - b.mass[:, None] * g
     rest[b.time[:-1, None] < b.release_time + 1e-9] = 0.0  # up to the step of its release
-    worst = float(np.abs(rest).max() / np.abs(b.contact_force).max())
+    worst = np.abs(rest).max() / np.abs(b.contact_force).max()
     checks.below(f"{run.folder.name}: M dU/dt - contact - M g", worst, ROUND_OFF)
 
 
 def packing(run: Run, inset: float) -> tuple[float, float]:
     """Share of solid below the height of 80 % of the centroids: over the whole section down to the
     floor, and of what is farther than `inset` [m] from walls and floor. Exact, by cutting."""
-    b, high = run.bodies, run.grid.high.copy()
-    low = run.grid.low.copy()
+    b, low, high = run.bodies, run.grid.low.copy(), run.grid.high.copy()
     high[2] = np.percentile(b.position[-1, :, 2], 80)
-    shapes = [run.shapes[name] for name in b.shape]
     corner = np.concatenate(
-        [
-            place(s.points, x, q)[s.tets]
-            for s, x, q in zip(shapes, b.position[-1], b.quaternion[-1], strict=True)
-        ]
+        [run.points(k, -1)[run.shapes[name].tets] for k, name in enumerate(b.shape)]
     )
     whole = volume_in_box(corner, low, high) / float(np.prod(high - low))
     low += inset
@@ -97,7 +88,7 @@ def pile(run: Run, checks: Checks) -> None:
     for what, porosity in published.items():
         title = f"{name}: porosity away from walls and floor, {what}"
         checks.close(title, 1.0 - core, porosity, 0.1, counts=False)
-    speed = float(np.median(np.linalg.norm(b.velocity[-1], axis=1)))
+    speed = np.median(np.linalg.norm(b.velocity[-1], axis=1))
     checks.below(f"{name}: median speed at the end [m/s]", speed, 1e-2, name != "smooth")
     released = int((b.release_time <= b.time[-1]).sum())
     checks.true(f"{name}: all blocks in the tank", released == b.n, f"{released} of {b.n}")

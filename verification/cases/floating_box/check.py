@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from measures.buoyancy import densities
 from measures.checks import Checks
 from micstools.reading.reader import Run
 
@@ -17,16 +18,15 @@ def tilt_deg(run: Run) -> np.ndarray:
 
 def draft_of_weight(run: Run) -> float:
     """Draft of the upright box at rest by Archimedes, water below and air above [m]."""
-    liquid = float(run.value("fluid", "liquid_density"))
-    gas = float(run.value("fluid", "gas_density"))
+    liquid, gas = densities(run)
     sides = np.array(run.value("shape", "size"), float)
-    immersed = (float(run.bodies.mass[0]) - gas * sides.prod()) / (liquid - gas)
+    immersed = (run.bodies.mass[0] - gas * sides.prod()) / (liquid - gas)
     return float(immersed / (sides[0] * sides[1]))
 
 
 def metacentric_height(run: Run) -> float:
     """Height of the metacentre above the centre of mass of the floating upright box [m]."""
-    width, _, height = np.array(run.value("shape", "size"), float)
+    width, _, height = run.value("shape", "size")
     draft = draft_of_weight(run)
     return float(width**2 / (12 * draft) + draft / 2 - height / 2)
 
@@ -40,10 +40,8 @@ def righting_arm(run: Run) -> tuple[float, float]:
     (d^2 + s^2 B^2/12)/(2 d) above the base; both turn with the box.
     """
     b = run.bodies
-    liquid = float(run.value("fluid", "liquid_density"))
-    gas = float(run.value("fluid", "gas_density"))
-    level = float(run.value("fluid", "water_level"))
-    width, _, height = np.array(run.value("shape", "size"), float)
+    (liquid, gas), level = densities(run), run.value("fluid", "water_level")
+    width, _, height = run.value("shape", "size")
     tilt = np.radians(tilt_deg(run)[0])
     draft = (level - b.position[0, 0, 2]) / np.cos(tilt) + height / 2
     slope = np.tan(tilt)
@@ -62,9 +60,8 @@ def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
     the level that the liquid would have at rest."""
     b, high = run.bodies, run.grid.high - run.grid.low
     sides = np.array(run.value("shape", "size"), float)
-    level = (run.series.liquid_volume + sides[0] * sides[1] * draft_of_weight(run)) / (
-        high[0] * high[1]
-    )
+    raised = sides[0] * sides[1] * draft_of_weight(run)
+    level = (run.series.liquid_volume + raised) / (high[0] * high[1])
     draft = level - (b.position[:, 0, 2] - sides[2] / 2)
     even = np.arange(0.0, b.time[-1], 1e-3)
     d = np.interp(even, b.time, draft)
@@ -76,41 +73,28 @@ def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Each upright box: draft and period; each tilted one: whether it comes back."""
-    study, curves = {}, {}
     for run in runs:
         name, b = run.folder.name, run.bodies
+        kind, tilt = name.split("_")[0], tilt_deg(run)
         if name.endswith("held"):
             ours, arm = righting_arm(run)
-            said = f"{name.split('_')[0]} box held at {tilt_deg(run)[0]:.0f} deg"
-            checks.close(f"{said}: righting arm / sine [mm]", 1e3 * ours, 1e3 * arm, ARM_BAND)
-            continue
-        if name.endswith("tilted"):
-            tilt, metacentre = tilt_deg(run), 1e3 * metacentric_height(run)
-            last = tilt[b.time > 0.75 * b.time[-1]].max()
+            said = f"{kind} box held at {tilt[0]:.0f} deg: righting arm / sine [mm]"
+            checks.close(said, 1e3 * ours, 1e3 * arm, ARM_BAND)
+        elif name.endswith("tilted"):
+            metacentre, last = 1e3 * metacentric_height(run), tilt[b.time > 0.75 * b.time[-1]].max()
             figures = f"{tilt[0]:.1f} at first, {last:.1f} deg at most in the last quarter"
-            said = f"GM = {metacentre:+.1f} mm: a {name.split('_')[0]} box"
+            said = f"GM = {metacentre:+.1f} mm: a {kind} box"
             if metacentre > 0:
                 checks.true(f"{said} comes back", tilt.max() < 1.05 * tilt[0], figures)
             else:
                 checks.true(f"{said} capsizes", last > 45, figures)
-            continue
-        expected = draft_of_weight(run)
-        found, period, draft = mean_draft(run)
-        cells = 0.06 / float(run.grid.spacing[2])
-        name = f"{cells:.0f} cells per height"
-        checks.close(f"{name}: mean draft [m]", found, expected, DRAFT_BAND)
-        low, high = (2 * np.pi * np.sqrt((1 + ca) * expected / G) for ca in (0.3, 1.0))
-        checks.within(f"{name}: heave period [s]", period, low, high)
-        study[cells] = found
-        curves[name] = (b.time, 1e3 * draft)
-        reference = expected
-    if curves:
-        checks.figure(
-            "draft",
-            "t [s]",
-            "mm",
-            curves,
-            {"Archimedes": ([0.0, 3.0], [1e3 * reference] * 2)},
-            smooth=True,
-        )
-        checks.study("mean draft [m]", study, reference, "cells per height")
+        else:
+            expected, cells = draft_of_weight(run), 0.06 / float(run.grid.spacing[2])
+            found, period, draft = mean_draft(run)
+            name = f"{cells:.0f} cells per height"
+            checks.close(f"{name}: mean draft [m]", found, expected, DRAFT_BAND)
+            low, high = (2 * np.pi * np.sqrt((1 + ca) * expected / G) for ca in (0.3, 1.0))
+            checks.within(f"{name}: heave period [s]", period, low, high)
+            exact = {"Archimedes": ([0.0, 3.0], [1e3 * expected] * 2)}
+            checks.figure("draft", "t [s]", "mm", {name: (b.time, 1e3 * draft)}, exact, smooth=True)
+            checks.study("mean draft [m]", {cells: found}, expected, "cells per height")

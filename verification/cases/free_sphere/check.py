@@ -6,14 +6,13 @@ usage: python check.py RUN [RUN ...]; runs that differ in dt only are compared w
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import liquid
 from micstools.reading.reader import Run
 
-VARIES = (  # of one run
-    "numerics momentum",
-    "numerics solid_fraction",
-    "numerics subcells",
-    "numerics pressure_solver",
+VARIES = tuple(
+    f"numerics {name}" for name in ("momentum", "solid_fraction", "subcells", "pressure_solver")
 )
+"""Of one run."""
 THEORY_BAND, STEP_BAND = 0.02, 0.01
 START_BAND = 0.03  # of way and speed at the ends of the first steps, at the default step
 SPIN_BAND = 1.0  # speed of the surface by spin over that of the sphere
@@ -61,9 +60,8 @@ def start(run: Run, theory: float, checks: Checks) -> None:
         if abs(way[row]) > diameter / 30:
             break
         name = f"{run.folder.name}: step {row}"
-        checks.close(f"{name}, way [m]", float(way[row]), theory * t[row] ** 2 / 2, START_BAND)
-        speed = float(b.velocity[row, 0, 2])
-        checks.close(f"{name}, speed [m/s]", speed, theory * t[row], START_BAND)
+        checks.close(f"{name}, way [m]", way[row], theory * t[row] ** 2 / 2, START_BAND)
+        checks.close(f"{name}, speed [m/s]", b.velocity[row, 0, 2], theory * t[row], START_BAND)
 
 
 def check(runs: list[Run], checks: Checks) -> None:
@@ -71,29 +69,25 @@ def check(runs: list[Run], checks: Checks) -> None:
     box = float((runs[0].grid.high - runs[0].grid.low)[2])
     by_ratio: dict[float, list[Run]] = {}
     for run in runs:
-        shape = run.shapes[run.bodies.shape[0]]
-        fluid = float(run.value("fluid", "liquid_density"))
-        g = float(run.value("fluid", "gravity")[2])
-        ratio = shape.density / fluid
+        shape, g, b = run.shapes[run.bodies.shape[0]], run.gravity[2], run.bodies
+        ratio, dt = shape.density / liquid(run)[0], run.value("run", "dt")
         diameter = 2 * (3 * shape.volume / (4 * np.pi)) ** (1 / 3)
         theory = (ratio - 1) / (ratio + added_mass(diameter, box))
         if run.folder.name.endswith("spin"):
-            spin = np.linalg.norm(run.bodies.angular_velocity[1:, 0], axis=1) * diameter / 2
-            speed = np.linalg.norm(run.bodies.velocity[1:, 0], axis=1)
+            spin = np.linalg.norm(b.angular_velocity[1:, 0], axis=1) * diameter / 2
+            speed = np.linalg.norm(b.velocity[1:, 0], axis=1)
             name = f"{run.folder.name}: largest speed of the surface by spin / speed"
-            checks.below(name, float((spin / speed).max()), SPIN_BAND)
-            continue
-        if float(run.value("run", "dt")) >= SHORT:
+            checks.below(name, (spin / speed).max(), SPIN_BAND)
+        elif dt >= SHORT:
             start(run, theory * g, checks)
-            continue
-        name = f"{run.folder.name}: s = {ratio:.3g}, dt = {run.value('run', 'dt'):.2g} s"
-        checks.close(f"{name}, a/g", acceleration(run) / g, theory, THEORY_BAND)
-        sideways = float(np.abs(run.bodies.velocity[-1, 0, :2]).max())
-        along = abs(float(run.bodies.velocity[-1, 0, 2]))
-        checks.below(f"{name}, sideways speed / speed", sideways / along, 1e-6)
-        by_ratio.setdefault(round(ratio, 6), []).append(run)
+        else:
+            name = f"{run.folder.name}: s = {ratio:.3g}, dt = {dt:.2g} s"
+            checks.close(f"{name}, a/g", acceleration(run) / g, theory, THEORY_BAND)
+            sideways = np.abs(b.velocity[-1, 0, :2]).max() / abs(b.velocity[-1, 0, 2])
+            checks.below(f"{name}, sideways speed / speed", sideways, 1e-6)
+            by_ratio.setdefault(round(ratio, 6), []).append(run)
     for same in by_ratio.values():
-        finest = min(same, key=lambda run: float(run.value("run", "dt")))
+        finest = min(same, key=lambda run: run.value("run", "dt"))
         for run in same:
             if run is not finest:
                 name = f"{run.folder.name}: a against {finest.folder.name} [m/s2]"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import liquid
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -43,7 +44,7 @@ class Flow:
     def drag(self, begin: float, end: float) -> float:
         """Mean drag coefficient in a wide stream from one way to another."""
         now = (self.way > begin) & (self.way <= end)
-        found = float((self.force[now, 1] * self.step[now]).sum() / self.step[now].sum())
+        found = float(np.average(self.force[now, 1], weights=self.step[now]))
         if self.body == "cylinder":  # Allen and Vincenti
             return found * (1 - found * self.share / 2 - 2.5 * self.share**2)
         blocked = 2 * MASKELL * self.share
@@ -66,8 +67,7 @@ def flow_of(run: Run) -> Flow:
         area = size[0] * size[1]
     stream = float(run.value("boundary", "y_min_velocity")[1])
     speed = stream - float(b.velocity[-1, 0, 1])
-    density = float(run.value("fluid", "liquid_density"))
-    viscosity = float(run.value("fluid", "liquid_viscosity"))
+    density, viscosity = liquid(run)
     return Flow(
         body=body,
         reynolds=density * speed * size[0] / viscosity,
@@ -83,12 +83,13 @@ def flow_of(run: Run) -> Flow:
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Mean drag of the second half of each run, in a wide stream; lift of the long cylinder."""
-    flows = [flow_of(run) for run in runs]
-    drags: dict[str, dict[float, float]] = {}
+    flows, drags = [flow_of(run) for run in runs], {}
     for flow in flows:
         name = f"{flow.name}, {flow.cells:g} cells"
         drag = flow.drag(flow.way[-1] / 2, flow.way[-1])
         drags.setdefault(flow.name, {})[flow.cells] = drag
+        checks.study(f"{flow.name}: drag", {flow.cells: drag}, resolution="cells per diameter")
+        checks.figure("drag", "way / D", "-", {name: (flow.way, flow.force[:, 1])})
         if flow.moved:
             compare_with_held(checks, flow, flows)
         elif flow.reynolds < 5e3:
@@ -101,18 +102,12 @@ def check(runs: list[Run], checks: Checks) -> None:
             lift = flow.force[flow.way > flow.way[-1] / 2, 0]
             turns = int((lift[1:] * lift[:-1] < 0).sum())
             checks.true(f"{name}: lift changes sign", turns > 2, f"{turns} times", flow.cells > 11)
+            curve = {name: (flow.way, flow.force[:, 0])}
+            checks.figure("lift of the long cylinder", "way / D", "-", curve)
     held = drags.get("sphere, Re 1e4", {})
     if {6, 8, 12} <= set(held):
-        spread = (max(held.values()) - min(held.values())) / float(np.mean([*held.values()]))
+        spread = np.ptp([*held.values()]) / np.mean([*held.values()])
         checks.below("sphere, Re 1e4: spread over 6, 8 and 12 cells", spread, SPREAD)
-    for name, values in drags.items():
-        if len(values) > 1:
-            checks.study(f"{name}: drag", values, resolution="cells per diameter")
-    curves = {f"{flow.name}, {flow.cells:g} cells": flow for flow in flows}
-    checks.figure("drag", "way / D", "-", {n: (f.way, f.force[:, 1]) for n, f in curves.items()})
-    long = {n: (f.way, f.force[:, 0]) for n, f in curves.items() if f.body == "cylinder"}
-    if long:
-        checks.figure("lift of the long cylinder", "way / D", "-", long)
 
 
 def compare_with_held(checks: Checks, flow: Flow, flows: list[Flow]) -> None:

@@ -1,62 +1,43 @@
 """Drag of a sphere held in a stream, against a body-fitted solver in the same box."""
 
-import csv
-from pathlib import Path
-
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import cells as cells_along
+from measures.facts import liquid, size, table
 from micstools.reading.reader import Run
 
-HERE = Path(__file__).resolve().parent
+DRAG = table(__file__, "reference.csv").query("tank == 'box'").set_index("reynolds").drag
+"""Drag coefficient in the box by Reynolds number."""
 BAND = 0.03
 APART = 0.03  # of the drag, moved less held, which in truth are one and the same flow
 LATE = 2.0  # diameters of way at the end over which the drag is averaged
 
 
-def reference() -> dict[int, float]:
-    """Drag coefficient in the box by Reynolds number."""
-    lines = (HERE / "reference.csv").read_text().splitlines()
-    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
-    return {int(row["reynolds"]): float(row["drag"]) for row in rows if row["tank"] == "box"}
-
-
 def check(runs: list[Run], checks: Checks) -> None:
     """Mean drag of the last two diameters of way; in the long box moved against held."""
-    known = reference()
-    curves: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    drags: dict[int, dict[float, float]] = {}
     long: dict[str, float] = {}
     for run in runs:
-        b, diameter = run.bodies, float(run.value("shape", "size"))
-        density = float(run.value("fluid", "liquid_density"))
-        stream = float(run.value("fluid", "velocity")[2])
-        speed = stream - float(b.velocity[-1, 0, 2])
-        viscosity = float(run.value("fluid", "liquid_viscosity"))
+        b, diameter, (density, viscosity) = run.bodies, size(run), liquid(run)
+        stream = run.value("fluid", "velocity")[2]
+        speed = stream - b.velocity[-1, 0, 2]
         reynolds = round(density * speed * diameter / viscosity)
-        way, step = b.time * speed / diameter, run.series.dt
+        way = b.time * speed / diameter
         late = way > way[-1] - LATE
-        factor = 1 / (0.5 * density * speed**2 * np.pi * diameter**2 / 4)
-        force = b.fluid_force[:, 0] * factor
-        mean = (force[late] * step[late, None]).sum(axis=0) / step[late].sum()
-        cells = round(diameter / float(run.grid.spacing[2]), 1)
+        force = b.fluid_force[:, 0] / (0.5 * density * speed**2 * np.pi * diameter**2 / 4)
+        mean = np.average(force[late], axis=0, weights=run.series.dt[late])
+        cells = cells_along(run, diameter)
         if run.grid.z[-1] > 15 * diameter:
-            courant = float(run.value("run", "cfl_max"))
+            courant = run.value("run", "cfl_max")
             name = "held" if stream else f"moved, Courant number {courant:g}"
-            long[name] = float(mean[2])
+            long[name] = mean[2]
         else:
-            name = f"Re {reynolds}, {cells:g} cells per diameter"
-            drags.setdefault(reynolds, {})[cells] = float(mean[2])
-            checks.close(
-                f"{name}: drag coefficient", float(mean[2]), known[reynolds], BAND, cells > 11
-            )
-        checks.below(
-            f"{name}: lift over drag", float(np.hypot(mean[0], mean[1]) / mean[2]), 0.01, cells > 11
-        )
-        curves[name] = (way, force[:, 2])
+            name, exact = f"Re {reynolds}, {cells:g} cells per diameter", DRAG[reynolds]
+            checks.study(f"Re {reynolds}: drag", {cells: mean[2]}, exact, "cells per diameter")
+            checks.close(f"{name}: drag coefficient", mean[2], exact, BAND, cells > 11)
+        lift = np.hypot(mean[0], mean[1]) / mean[2]
+        checks.below(f"{name}: lift over drag", lift, 0.01, cells > 11)
+        checks.figure("drag coefficient", "way / diameter", "-", {name: (way, force[:, 2])})
     for name, drag in long.items():
         if name != "held" and "held" in long:
             checks.close(f"in a long box, {name}: drag as held", drag, long["held"], APART)
-    for reynolds, by_cells in sorted(drags.items()):
-        checks.study(f"Re {reynolds}: drag", by_cells, known[reynolds], "cells per diameter")
-    checks.figure("drag coefficient", "way / diameter", "-", curves)

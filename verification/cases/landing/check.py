@@ -19,9 +19,9 @@ def squeezed(run: Run, frame: Fields) -> float:
     bodies = run.bodies
     there = bodies.release_time < frame.time - 1e-9  # a drop that is due now is not there yet
     volume = np.array([run.shapes[name].volume for name in bodies.shape])
-    tank = float(np.prod(run.grid.high - run.grid.low))
-    room = float((1.0 - frame.solid.astype(float)).mean()) * tank
-    return (tank - float(volume[there].sum())) / room - 1.0
+    tank = np.prod(run.grid.high - run.grid.low)
+    room = (1.0 - frame.solid.astype(float)).mean() * tank
+    return float((tank - volume[there].sum()) / room - 1.0)
 
 
 def excess_of(run: Run, name: str, checks: Checks) -> None:
@@ -38,7 +38,7 @@ def excess_of(run: Run, name: str, checks: Checks) -> None:
         checks.below(f"{name}: excess against that of overlaps [V]", unlike, EXCESS_LIMIT)
     state = run.restart()
     open_share = 1.0 - np.asarray(state["flow/alpha"]).squeeze()
-    left = float(np.abs(excess(run, state) - share[-1] * open_share).max())
+    left = np.abs(excess(run, state) - share[-1] * open_share).max()
     checks.below(f"{name}: in the restart file [V]", left, EXCESS_LIMIT)
     volume = run.grid.spacing.prod()
     held = [(f.liquid.astype(float) * (1.0 - f.solid.astype(float))).sum() for f in frames]
@@ -50,12 +50,12 @@ def excess_of(run: Run, name: str, checks: Checks) -> None:
 def rise_of(run: Run, name: str, checks: Checks) -> None:
     """Height of the water with the blocks under it at the end, over that of the start."""
     length = run.grid.high - run.grid.low
-    frame, area = run.fields_at(run.field_times[-1]), float(length[0] * length[1])
+    frame = run.fields_at(run.field_times[-1])
     solid = frame.solid.astype(float)
-    height = float((solid + (1.0 - solid) * frame.liquid).mean() * length[2])
-    wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / area
-    level = float(run.value("fluid", "water_level"))
-    checks.close(f"{name}: rise of the level [m]", height - level, wanted, LEVEL_BAND)
+    height = (solid + (1.0 - solid) * frame.liquid).mean() * length[2]
+    wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / length[:2].prod()
+    rise = height - run.value("fluid", "water_level")
+    checks.close(f"{name}: rise of the level [m]", rise, wanted, LEVEL_BAND)
 
 
 def check(runs: list[Run], checks: Checks) -> None:
@@ -65,5 +65,5 @@ def check(runs: list[Run], checks: Checks) -> None:
         excess_of(run, name, checks)
         if name.startswith(("case", "flat")):
             rise_of(run, name, checks)
-    curves = {run.folder.name: (run.series.time, run.series.volume_excess_max) for run in runs}
-    checks.figure("largest excess of fluid in a cell", "t [s]", "V", curves)
+        curves = {name: (run.series.time, run.series.volume_excess_max)}
+        checks.figure("largest excess of fluid in a cell", "t [s]", "V", curves)

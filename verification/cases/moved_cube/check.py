@@ -11,18 +11,15 @@ G = 9.81
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Largest deviation of the force from its mean over a cell of way, after one edge of way."""
-    curves = {}
     for run in runs:
         b, h = run.bodies, float(run.grid.spacing[2])
-        cells = float(run.value("shape", "size")) / h
-        speed = -float(b.velocity[0, 0, 2])
-        weight = float(run.shapes["cube"].density * run.shapes["cube"].volume * G)
+        cells, cube = run.value("shape", "size") / h, run.shapes["cube"]
+        speed, weight = -b.velocity[0, 0, 2], cube.density * cube.volume * G
         force, way = b.fluid_force[:, 0, 2] / weight, b.time * speed / h
         level = np.array([force[abs(way - w) <= 0.5].mean() for w in way])
         late = (way >= cells) & (way < way[-1] - 0.5)
         name = f"{cells:.3g} cells per edge"
-        noise = float(abs(force - level)[late].max())
-        checks.below(f"{name}: largest noise of the force, in weights", noise, BAND)
-        checks.below(f"{name}: its scatter", float((force - level)[late].std()), BAND, counts=False)
-        curves[name] = (way / cells, force)
-    checks.figure("force", "way / edge", "weights", curves)
+        noise = (force - level)[late]
+        checks.below(f"{name}: largest noise of the force, in weights", abs(noise).max(), BAND)
+        checks.below(f"{name}: its scatter", noise.std(), BAND, counts=False)
+        checks.figure("force", "way / edge", "weights", {name: (way / cells, force)})

@@ -18,25 +18,16 @@ def depths(run: Run, t: float) -> Array:
 
 def waves(run: Run, reference: Run, checks: Checks) -> None:
     """Difference from the tank that goes on, over the height of the waves that reach the side."""
-    n = run.grid.x.size - 1
-    incident, worst = 0.0, 0.0
-    for t in run.field_times:
-        undisturbed = depths(reference, t)
-        worst = max(worst, float(np.abs(depths(run, t) - undisturbed[:n]).max()))
-        level = float(run.value("fluid", "water_level"))
-        incident = max(incident, float(abs(undisturbed[n - 1] - level)))
-    name = run.folder.name
-    checks.below(f"{name} waves: part that comes back", worst / incident, REFLECTED[name])
-    t = float(run.field_times[-1])
-    x = run.grid.centres[0]
-    checks.figure(
-        f"{name} waves at {t:.2f} s",
-        "x [m]",
-        "depth [m]",
-        {"outflow": (x, depths(run, t))},
-        {"tank that goes on": (x, depths(reference, t)[:n])},
-        smooth=True,
+    name, n, x = run.folder.name, run.grid.x.size - 1, run.grid.centres[0]
+    found, undisturbed = (
+        np.array([depths(r, t)[:n] for t in run.field_times]) for r in (run, reference)
     )
+    incident = np.abs(undisturbed[:, n - 1] - run.value("fluid", "water_level")).max()
+    worst = np.abs(found - undisturbed).max()
+    checks.below(f"{name} waves: part that comes back", worst / incident, REFLECTED[name])
+    title, exact = f"{name} waves at {run.field_times[-1]:.2f} s", (x, undisturbed[-1])
+    curves = {"outflow": (x, found[-1])}, {"tank that goes on": exact}
+    checks.figure(title, "x [m]", "depth [m]", *curves, smooth=True)
 
 
 def current(run: Run, checks: Checks) -> None:
@@ -44,11 +35,12 @@ def current(run: Run, checks: Checks) -> None:
     fields = run.fields_at(run.field_times[-1])
     depth = depths(run, float(run.field_times[-1]))
     flow = run.grid.spacing[2] * (fields.velocity[..., 0] * fields.liquid).sum(axis=0)[0]
-    checks.close("current from rest: depth at the outflow [m]", float(depth[-1]), LEVEL, 0.005)
-    checks.close("current from rest: mean depth [m]", float(depth.mean()), LEVEL, 0.005)
-    checks.close(
-        "current from rest: discharge at the outflow [m2/s]", float(flow[-1]), SPEED * LEVEL, 0.01
-    )
+    for said, ours, wanted, band in (
+        ("depth at the outflow [m]", depth[-1], LEVEL, 0.005),
+        ("mean depth [m]", depth.mean(), LEVEL, 0.005),
+        ("discharge at the outflow [m2/s]", flow[-1], SPEED * LEVEL, 0.01),
+    ):
+        checks.close(f"current from rest: {said}", ours, wanted, band)
 
 
 def uniform(run: Run, checks: Checks) -> None:
@@ -56,8 +48,8 @@ def uniform(run: Run, checks: Checks) -> None:
     worst = 0.0
     for t in run.field_times:
         fields = run.fields_at(t)
-        worst = max(worst, float(np.abs(fields.velocity - [SPEED, 0.0, 0.0]).max()))
-        change = float(np.abs(depths(run, t) - LEVEL).max())
+        worst = max(worst, np.abs(fields.velocity - [SPEED, 0.0, 0.0]).max())
+        change = np.abs(depths(run, t) - LEVEL).max()
         checks.below(f"uniform current: change of depth at {t:.1f} s [m]", change, 1e-8)
     checks.below("uniform current: change of velocity [m/s]", worst, 1e-6)
 

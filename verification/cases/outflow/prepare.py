@@ -1,14 +1,11 @@
 """Humps of water before an outflow, and the same in a tank that goes on, as references."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
-from micstools.shapes.geometry import Array  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state
+from micstools.shapes.geometry import Array
 
 DEPTHS = {"long": (0.0513, 0.2), "medium": (0.1013, 0.1), "short": (0.1513, 0.06)}
 COSTS = {"long": 5, "medi": 21, "shor": 21}  # [s]

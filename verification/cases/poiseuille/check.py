@@ -1,11 +1,10 @@
 """Flow between plates and in ducts, driven by a body force along a periodic direction."""
 
-from pathlib import Path
-
 import numpy as np
 
 from measures.checks import Checks
-from micstools.reading.profiles import cubic, table, with_ends
+from measures.facts import table
+from micstools.reading.profiles import cubic, with_ends
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -25,34 +24,29 @@ def exact(y: Array, t: float) -> Array:
 
 def check_series(checks: Checks) -> None:
     """The series must be that of the table."""
-    rows = table(Path(__file__).parent / "plane.csv")
-    places = np.array([float(row["y_over_h"]) for row in rows])
+    rows = table(__file__, "plane.csv")
     for name, t in TIMES.items():
-        wanted = np.array([float(row[name]) for row in rows])
         late = 10.0 if name == "steady" else t
-        far = float(np.abs(exact(places, late) - wanted).max())
+        far = np.abs(exact(rows.y_over_h.to_numpy(), late) - rows[name]).max()
         checks.below(f"series against the table, {name}", far, 1e-7)
 
 
-def plane(run: Run, checks: Checks) -> float:
-    """Profiles of the start and the steady one at the cell centres; the steady error."""
-    z = run.grid.centres[2]
+def plane(run: Run, checks: Checks) -> None:
+    """Profiles of the start and the steady one at the cell centres."""
+    z, worst = run.grid.centres[2], 0.0
     cells = z.size
-    ours: dict[str, tuple[Array, Array]] = {}
-    true: dict[str, tuple[Array, Array]] = {}
-    worst = 0.0
     for t in TIMES.values():
         fields = run.fields_at(t)
         wanted, found = exact(z, fields.time), fields.velocity[:, 0, 0, 0]
-        worst = float(np.abs(found - wanted).max() / wanted.max())
-        ours[f"t = {t:g}"], true[f"exact, t = {t:g}"] = (z, found), (z, wanted)
+        worst = np.abs(found - wanted).max() / wanted.max()
         if cells >= BAND_CELLS:
             thin = np.sqrt(t) * cells < THIN
             label = f"plane, {cells} cells, nu t/h2 = {t:g}: largest error"
             checks.below(label, worst, BAND, counts=not thin)
-    if cells == BAND_CELLS:
-        checks.figure("start between plates", "z/h", "u nu/(G h2)", ours, true)
-    return worst
+        if cells == BAND_CELLS:
+            curves = {f"t = {t:g}": (z, found)}, {f"exact, t = {t:g}": (z, wanted)}
+            checks.figure("start between plates", "z/h", "u nu/(G h2)", *curves)
+    checks.study("plane: error of the steady profile", {cells: worst}, 0.0)
 
 
 def duct(run: Run, checks: Checks) -> None:
@@ -62,23 +56,14 @@ def duct(run: Run, checks: Checks) -> None:
     width = float(run.grid.y[-1])
     across = with_ends(0.0, cubic(np.array([0.5]), z, u.T)[:, 0], 0.0)
     centre = cubic(np.array([0.5 * width]), with_ends(0.0, y, width), across)[0]
-    for row in table(Path(__file__).parent / "duct.csv"):
-        if abs(float(row["aspect"]) - width) < 1e-9:
-            checks.close(
-                f"duct {width:g}: centre velocity", float(centre), float(row["centre"]), BAND
-            )
-            checks.close(
-                f"duct {width:g}: mean velocity", float(u.mean()), float(row["mean"]), BAND
-            )
+    for row in table(__file__, "duct.csv").itertuples():
+        if abs(row.aspect - width) < 1e-9:
+            checks.close(f"duct {width:g}: centre velocity", centre, row.centre, BAND)
+            checks.close(f"duct {width:g}: mean velocity", u.mean(), row.mean, BAND)
 
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Plane runs and ducts."""
-    errors: dict[float, float] = {}
     check_series(checks)
     for run in runs:
-        if run.folder.name.startswith("duct"):
-            duct(run, checks)
-        else:
-            errors[run.grid.z.size - 1] = plane(run, checks)
-    checks.study("plane: error of the steady profile", errors, 0.0)
+        (duct if run.folder.name.startswith("duct") else plane)(run, checks)

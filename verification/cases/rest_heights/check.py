@@ -4,7 +4,7 @@ import numpy as np
 
 from measures.checks import Checks
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import Array
+from micstools.shapes.geometry import Array, rotation_matrix
 
 EDGE = 20.0  # of a cube [mm]
 HEIGHTS = (1.5 * EDGE, np.sqrt(2.0) * EDGE, 2.5 / np.sqrt(3.0) * EDGE)
@@ -18,10 +18,8 @@ VARIES = ("contact model", "contact solver", "shape spheres")
 
 def tilt(q: Array, legs: tuple[float, float, float]) -> float:
     """Angle between the vertical and the nearest direction (+-1, ..) of that kind [degrees]."""
-    w, v = q[0], -q[1:]
-    up = np.array([0.0, 0.0, 1.0])
-    body = up + 2.0 * np.cross(v, np.cross(v, up) + w * up)
-    ours, ideal = np.sort(np.abs(body)), np.sort(np.array(legs)) / np.linalg.norm(legs)
+    up = rotation_matrix(q)[2]  # in body axes
+    ours, ideal = np.sort(np.abs(up)), np.sort(np.array(legs)) / np.linalg.norm(legs)
     return float(np.degrees(2.0 * np.arcsin(min(1.0, np.linalg.norm(ours - ideal) / 2.0))))
 
 
@@ -32,8 +30,8 @@ def check(runs: list[Run], checks: Checks) -> None:
         counts = run.value("contact", "model") == "surface"
         for k, (height, legs) in enumerate(zip(HEIGHTS, LEGS, strict=True)):
             on = f"{name}, {k + 1} leg{'s' if k else ''}:"
-            ours = 1e3 * float(b.position[-1, k, 2])
+            ours = 1e3 * b.position[-1, k, 2]
             checks.within(f"{on} height [mm]", ours, height - BAND, height + BAND, counts)
             checks.below(f"{on} tilt [deg]", tilt(b.quaternion[-1, k], legs), TILT, counts)
-            speed = float(np.linalg.norm(b.velocity[-1, k]))
+            speed = np.linalg.norm(b.velocity[-1, k])
             checks.below(f"{on} speed at the end [m/s]", speed, REST, counts)

@@ -15,9 +15,9 @@ def check(runs: list[Run], checks: Checks) -> None:
         name, state = run.folder.name, run.restart()
         alpha, speed = state["flow/alpha"][0], np.linalg.norm(state["flow/u"], axis=0)
         wet = state["flow/c"][0] > 0.5
-        film = float(speed[wet & (alpha > FILM[0]) & (alpha < FILM[1])].max())
-        around = float(speed[wet & (alpha <= 0.0)].max())
+        film = speed[wet & (alpha > FILM[0]) & (alpha < FILM[1])].max()
+        around = speed[wet & (alpha <= 0.0)].max()
         checks.below(f"{name}: films over the water around", film / around, 1.0)
-        blocks = float(np.abs(run.bodies.velocity[-1]).max())
+        blocks = np.abs(run.bodies.velocity[-1]).max()
         checks.below(f"{name}: blocks at the end [m/s]", blocks, REST)
         checks.true(f"{name}: water moves", around > 10 * REST, f"{around:.3g} m/s")

@@ -3,12 +3,13 @@
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import cells as cells_along
+from measures.facts import liquid, size
 from micstools.reading.reader import Run
 
 QUICK = ("Re30_04",)
 BAND = 0.1
-CUBE = (np.pi / 6) ** (1 / 3)  # sphericity
-HEXAPOD = 0.589877
+SPHERICITY = {"cube": (np.pi / 6) ** (1 / 3), "hexapod": 0.589877}
 
 
 def drag_coefficient(reynolds: float, f: float) -> float:
@@ -22,33 +23,19 @@ def drag_coefficient(reynolds: float, f: float) -> float:
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Drag coefficient at the mean speed of the second half of each run."""
-    curves = {}
-    coefficients: dict[str, dict[float, float]] = {}
     for run in runs:
-        b, block = run.bodies, run.shapes["block"]
-        case = run.folder.name.rpartition("_")[0] or "Re100"
-        edge = float(run.value("shape", "size"))
+        b, block, (density, viscosity) = run.bodies, run.shapes["block"], liquid(run)
+        case = (run.folder.name.rpartition("_")[0] or "Re100").replace("_", " ")
         diameter = (6 * block.volume / np.pi) ** (1 / 3)
-        density = float(run.value("fluid", "liquid_density"))
-        viscosity = float(run.value("fluid", "liquid_viscosity")) / density
-        stream = float(run.value("boundary", "z_min_velocity")[2])
-        speed = stream - b.velocity[:, 0, 2]
+        speed = run.value("boundary", "z_min_velocity")[2] - b.velocity[:, 0, 2]
         late = b.time > 0.5 * b.time[-1]
-        mean = float((speed[late] * run.series.dt[late]).sum() / run.series.dt[late].sum())
-        cells = round(edge / float(run.grid.spacing[2]), 1)
+        mean = np.average(speed[late], weights=run.series.dt[late])
+        cells = cells_along(run, size(run))
         cd = 4 / 3 * (block.density / density - 1) * 9.81 * diameter / mean**2
-        reynolds = mean * diameter / viscosity
-        cube = run.value("shape", "kind") == "cube"
-        exact = drag_coefficient(reynolds, CUBE if cube else HEXAPOD)
-        name = f"{case.replace('_', ' ')}, {cells:g} cells per edge, Re = {reynolds:.4g}"
-        counts = reynolds < 500 and cells > 7
-        checks.close(f"{name}: drag coefficient", cd, exact, BAND, counts)
-        coefficients.setdefault(case, {})[cells] = cd
-        curves[f"{case.replace('_', ' ')}, {cells:g} cells"] = (
-            b.time * mean / diameter,
-            speed / mean,
-        )
-    for case, values in coefficients.items():
-        title = f"{case.replace('_', ' ')}: drag coefficient"
-        checks.study(title, values, resolution="cells per edge")
-    checks.figure("speed over its mean", "t U/de", "-", curves)
+        reynolds = mean * diameter * density / viscosity
+        exact = drag_coefficient(reynolds, SPHERICITY[run.value("shape", "kind")])
+        name = f"{case}, {cells:g} cells per edge, Re = {reynolds:.4g}: drag coefficient"
+        checks.close(name, cd, exact, BAND, reynolds < 500 and cells > 7)
+        checks.study(f"{case}: drag coefficient", {cells: cd}, resolution="cells per edge")
+        curves = {f"{case}, {cells:g} cells": (b.time * mean / diameter, speed / mean)}
+        checks.figure("speed over its mean", "t U/de", "-", curves)

@@ -1,13 +1,10 @@
 """Write the surfaces of the first mode of a tank of 0.3 m: amplitude a hundredth of the depth."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state
 
 for cells in (16, 32, 64):  # per wavelength, which is twice the tank
     x = 0.3 * np.arange(cells // 2 + 1) / (cells // 2)

@@ -16,13 +16,12 @@ def check(runs: list[Run], checks: Checks) -> None:
     for run in runs:
         name = run.folder.name
         radius, main_curvatures = SHAPES[name]
-        sigma = float(run.value("fluid", "surface_tension"))
-        mu = float(run.value("fluid", "liquid_viscosity"))
+        sigma, mu = run.value("fluid", "surface_tension"), run.value("fluid", "liquid_viscosity")
         state = run.restart()
-        speed = float(np.abs(state["flow/u"]).max())
+        speed = np.abs(state["flow/u"]).max()
         checks.below(f"{name}: capillary number", speed * mu / sigma, CAPILLARY_BAND)
         p, c = state["flow/p"], state["flow/c"]
-        jump = float(p[c > 1 - 1e-8].mean() - p[c < 1e-8].mean())
+        jump = p[c > 1 - 1e-8].mean() - p[c < 1e-8].mean()
         exact = main_curvatures * sigma / radius
         checks.close(f"{name}: pressure jump [Pa]", jump, exact, JUMP_BAND)
         fallen = f"{run.series.curvature_fallback[-1]:.0f}"

@@ -4,11 +4,10 @@ import numpy as np
 
 from measures.balance import faces
 from measures.checks import Checks
+from measures.facts import liquid, size
 from micstools.reading.reader import Run
 
 DRAG_BAND, SCATTER_BAND, BALANCE_BAND = 0.015, 0.01, 1e-3
-
-
 QUICK = ("cells_12_mid_cell", "cells_12_offset_1")
 
 
@@ -30,30 +29,25 @@ def mean_velocity(run: Run) -> np.ndarray:
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Drag from the mean flow that a given force drives, and from the force on the sphere."""
-    study, same_grid = {}, {}
+    same_grid = []
     for run in runs:
-        edge, g = float(run.grid.high[0]), float(run.value("fluid", "gravity")[0])
-        density = float(run.value("fluid", "liquid_density"))
-        viscosity = float(run.value("fluid", "liquid_viscosity"))
-        diameter = float(run.value("shape", "size"))
-        cells = diameter / float(run.grid.spacing[0])
-        volume = run.shapes["sphere"].volume
+        edge, g, diameter = float(run.grid.high[0]), run.value("fluid", "gravity")[0], size(run)
+        density, viscosity = liquid(run)
+        cells, volume = diameter / float(run.grid.spacing[0]), run.shapes["sphere"].volume
         flow = mean_velocity(run)
         name = f"{run.folder.name}, {cells:.0f} cells per diameter"
-        factor = density * g * edge**3 / (3 * np.pi * viscosity * diameter * float(flow.mean()))
+        factor = density * g * edge**3 / (3 * np.pi * viscosity * diameter * flow.mean())
         exact = drag_factor(volume / edge**3)
         checks.close(f"{name}: drag / (6 pi mu a U)", factor, exact, DRAG_BAND, cells > 10)
-        force = float(run.bodies.fluid_force[-1, 0, 0])
-        driven = density * g * (edge**3 - volume)
+        force, driven = run.bodies.fluid_force[-1, 0, 0], density * g * (edge**3 - volume)
         checks.close(f"{name}: force on the sphere [N]", force, driven, BALANCE_BAND)
-        unequal = float(np.ptp(flow) / flow.mean())
+        unequal = np.ptp(flow) / flow.mean()
         checks.below(f"{name}: difference of the flow through layers", unequal, 1e-5)
         if abs(cells - 12) < 0.1:
-            same_grid[run.folder.name] = factor
+            same_grid.append(factor)
         if run.folder.name in ("case", f"cells_{cells:02.0f}"):
-            study[round(cells)] = factor
+            found = {round(cells): factor}
+            checks.study("drag / (6 pi mu a U)", found, exact, "cells per diameter")
     if len(same_grid) > 1:
-        found = list(same_grid.values())
-        scatter = (max(found) - min(found)) / float(np.mean(found))
-        checks.below(f"scatter over {len(found)} places at 12 cells", scatter, SCATTER_BAND)
-    checks.study("drag / (6 pi mu a U)", study, exact, "cells per diameter")
+        scatter = np.ptp(same_grid) / np.mean(same_grid)
+        checks.below(f"scatter over {len(same_grid)} places at 12 cells", scatter, SCATTER_BAND)

@@ -1,66 +1,44 @@
 """Speed of a sphere that settles slowly on the axis of a tube against the exact wall factor."""
 
-import csv
-from pathlib import Path
-
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import cells as cells_along
+from measures.facts import liquid, table
 from micstools.reading.reader import Run
 
-HERE = Path(__file__).resolve().parent
 DRAG_BAND, SCATTER_BAND = 0.015, 0.01
 
 
-def wall_factor(ratio: float) -> float:
-    """Drag over Stokes' drag for sphere over tube = `ratio`: Haberman, Sayre (1958)."""
-    lines = (HERE / "wall_factor.csv").read_text().splitlines()
-    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        if abs(float(row["lambda"]) - ratio) < 1e-6:
-            return float(row["K_cyl_haberman_sayre"])
-    raise ValueError(f"no factor for {ratio}")
-
-
 def check(runs: list[Run], checks: Checks) -> None:
-    """Drag factor from the last speed: weight under water over 3 pi mu D U."""
-    studies: dict[float, dict[float, float]] = {}
+    """Drag factor from the last speed, weight under water over 3 pi mu D U, over Stokes' drag: the
+    factor for sphere over tube of Haberman, Sayre (1958)."""
+    known = table(__file__, "wall_factor.csv").set_index("lambda").K_cyl_haberman_sayre
     same: dict[float, list[float]] = {}
-    curves = {}
     for run in runs:
         b, sphere, tube = run.bodies, run.shapes["sphere"], run.shapes["tube"]
         diameter = 2 * (3 * sphere.volume / (4 * np.pi)) ** (1 / 3)
-        radius = float(np.linalg.norm(tube.points[:, :2], axis=1).min())
-        ratio = round(diameter / 2 / radius, 2)
-        cells = round(diameter / float(run.grid.spacing[2]), 1)
-        density = float(run.value("fluid", "liquid_density"))
-        viscosity = float(run.value("fluid", "liquid_viscosity"))
+        density, viscosity = liquid(run)
+        radius = np.linalg.norm(tube.points[:, :2], axis=1).min()
+        ratio, cells = round(float(diameter / 2 / radius), 2), cells_along(run, diameter)
         weight = (sphere.density - density) * sphere.volume * 9.81
-        speed = -b.velocity[:, 1, 2]
-        late = b.time > 0.8 * b.time[-1]
-        factor = weight / (3 * np.pi * viscosity * diameter * float(speed[late].mean()))
-        exact, name = (
-            wall_factor(ratio),
-            f"{run.folder.name}, sphere/tube {ratio:g}, {cells:g} cells",
-        )
+        stokes = weight / (3 * np.pi * viscosity * diameter)
+        speed, late, exact = -b.velocity[:, 1, 2], b.time > 0.8 * b.time[-1], known[ratio]
+        factor, said = stokes / speed[late].mean(), f"sphere/tube {ratio:g}, {cells:g} cells"
+        name = f"{run.folder.name}, {said}"
         checks.close(f"{name}: drag / (3 pi mu D U)", factor, exact, DRAG_BAND, cells > 10)
-        uneven = float(np.ptp(speed[late]) / speed[-1])
+        uneven = np.ptp(speed[late]) / speed[-1]
         checks.below(f"{name}: change of speed in the last fifth", uneven, SCATTER_BAND)
-        drift = float(np.abs(b.velocity[late, 1, :2]).max() / speed[-1])
+        drift = np.abs(b.velocity[late, 1, :2]).max() / speed[-1]
         checks.below(f"{name}: sideways speed / speed", drift, 1e-3)
         if "aside" not in run.folder.name:
-            studies.setdefault(ratio, {})[cells] = factor
+            title = f"sphere/tube {ratio:g}: drag / (3 pi mu D U)"
+            checks.study(title, {cells: factor}, exact, "cells per diameter")
         if abs(cells - 12) < 0.1:
             same.setdefault(ratio, []).append(factor)
-        stokes = weight / (3 * np.pi * viscosity * diameter)
-        curves[f"sphere/tube {ratio:g}, {cells:g} cells"] = (
-            b.time * viscosity / density / radius**2,
-            speed * exact / stokes,
-        )
+        curves = {said: (b.time * viscosity / density / radius**2, speed * exact / stokes)}
+        checks.figure("speed over the exact one", "t nu/R^2", "-", curves)
     for ratio, found in same.items():
         if len(found) > 1:
-            scatter = (max(found) - min(found)) / float(np.mean(found))
+            scatter = np.ptp(found) / np.mean(found)
             checks.below(f"sphere/tube {ratio:g}: scatter over places", scatter, SCATTER_BAND)
-    for ratio, values in studies.items():
-        title = f"sphere/tube {ratio:g}: drag / (3 pi mu D U)"
-        checks.study(title, values, wall_factor(ratio), "cells per diameter")
-    checks.figure("speed over the exact one", "t nu/R^2", "-", curves)

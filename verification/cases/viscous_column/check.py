@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from measures.checks import Checks
+from measures.facts import liquid
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
@@ -56,12 +57,11 @@ def collapse(run: Run) -> Collapse:
     s = run.series
     if run.bodies.n:
         free = s.potential_energy_bodies[0] - s.potential_energy_bodies
-        return Collapse(
-            name, step, s.time, s.kinetic_energy_fluid + s.kinetic_energy_bodies, free, FREE_FALL
-        )
+        kinetic = s.kinetic_energy_fluid + s.kinetic_energy_bodies
+        return Collapse(name, step, s.time, kinetic, free, FREE_FALL)
     low, high = (np.array(run.value("water", corner), float) for corner in ("min", "max"))
     edge = high - low
-    weight = GRAVITY * float(run.value("fluid", "liquid_density")) * float(np.prod(edge))
+    weight = GRAVITY * liquid(run)[0] * float(np.prod(edge))
     level = float(np.prod(edge) / np.prod((run.grid.high - run.grid.low)[:2]))
     free = np.full(s.time.size, 0.5 * weight * (low[2] + high[2] - level))
     return Collapse(name, step, s.time, s.kinetic_energy_fluid, free, 1.0)
@@ -76,25 +76,16 @@ def check(runs: list[Run], checks: Checks) -> None:
         said = f"{found.name}, {found.step} step"
         checks.below(f"{said}: kinetic energy over that set free", found.gain, found.bound, counts)
         if found.time[-1] > LATE:
-            left = float(found.kinetic[-1] / found.largest)
+            left = found.kinetic[-1] / found.largest
             checks.below(f"{said}: left of it after {found.time[-1]:g} s", left, LATE_LIMIT, counts)
         pairs.setdefault(found.name, {})[found.step] = found
     for name, pair in pairs.items():
         if len(pair) == 2:
             whole, tenth = pair["whole"].largest, pair["tenth"].largest
             checks.close(f"{name}: largest kinetic energy [J]", whole, tenth, STEP_BAND)
-    drawn = {name: pair for name, pair in pairs.items() if name in OF_THE_FIGURE}
-    checks.figure(
-        "kinetic energy over all that is set free",
-        "t [s]",
-        "-",
-        {name: shown(pair["whole"]) for name, pair in drawn.items() if "whole" in pair},
-        {name: shown(pair["tenth"]) for name, pair in drawn.items() if "tenth" in pair},
-        smooth=True,
-    )
-
-
-def shown(found: Collapse) -> tuple[Array, Array]:
-    """The curve of a run, without what comes late."""
-    early = found.time <= SHOWN
-    return found.time[early], (found.kinetic / found.free.max())[early]
+        for step, found in pair.items() if name in OF_THE_FIGURE else ():
+            early = found.time <= SHOWN
+            curve = {name: (found.time[early], (found.kinetic / found.free.max())[early])}
+            curves = (curve, {}) if step == "whole" else ({}, curve)
+            title = "kinetic energy over all that is set free"
+            checks.figure(title, "t [s]", "-", *curves, smooth=True)

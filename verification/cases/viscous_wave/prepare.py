@@ -1,13 +1,10 @@
 """Write the sinusoidal surfaces: amplitude a hundredth of the wavelength of 1 m, half a wave."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state
 
 for cells in (16, 32, 64):  # per wavelength
     x = np.arange(cells // 2 + 1) / cells

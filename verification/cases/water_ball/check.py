@@ -17,9 +17,8 @@ def check(runs: list[Run], checks: Checks) -> None:
         nx, ny, nz = (len(f) - 1 for f in run.grid.faces)
         for name in ("flow/u", "flow/uf"):
             found = np.asarray(state[name])[:, :nz, :ny, :nx]
-            worst = float(np.abs(found - stream[:, None, None, None]).max()) / speed
+            worst = np.abs(found - stream[:, None, None, None]).max() / speed
             checks.below(f"change of {name} / speed", worst, BAND)
         liquid = run.fields_at(run.field_times[-1]).liquid
-        checks.true(
-            "water and air are still there", bool(liquid.max() > 0.99 and liquid.min() < 0.01)
-        )
+        there = liquid.max() > 0.99 and liquid.min() < 0.01
+        checks.true("water and air are still there", there)

@@ -22,14 +22,11 @@ def exact_period(depth: float) -> float:
 
 def check(runs: list[Run], checks: Checks) -> None:
     """Largest height in the last half second over that of the start."""
-    ours = {}
     for run in runs:
         name = run.folder.name
         time, amplitude = standing_amplitude(run, mode=4)
-        left = float(np.abs(amplitude[time > time[-1] - 0.5]).max()) / HEIGHT
+        left = np.abs(amplitude[time > time[-1] - 0.5]).max() / HEIGHT
         checks.close(f"{name}: height after nine periods", left, 1.0, BAND)
-        depth = (16.0 + int(name[-2:]) / 100.0) * SPACING
-        exact = exact_period(depth)
+        exact = exact_period((16.0 + int(name[-2:]) / 100.0) * SPACING)
         checks.close(f"{name}: period [s]", period(time, amplitude), exact, 0.05, counts=False)
-        ours[name] = (time, amplitude / HEIGHT)
-    checks.figure("height", "t [s]", "a/a0", ours)
+        checks.figure("height", "t [s]", "a/a0", {name: (time, amplitude / HEIGHT)})

@@ -1,14 +1,11 @@
 """Write small standing waves whose level lies at different heights within a row of cells."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
-from micstools.shapes.geometry import Array  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state
+from micstools.shapes.geometry import Array
 
 CELLS, ROWS, LENGTH = (32, 21, 0.3)
 

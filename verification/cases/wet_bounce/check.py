@@ -24,25 +24,16 @@ def restitution(run: Run) -> float:
 def check(runs: list[Run], checks: Checks) -> None:
     """Every step must give the restitution."""
     found = []
-    wanted = 0.9
     for run in runs:
-        wanted = float(run.value("contact", "restitution"))
-        share = float(run.value("run", "dt")) / float(run.value("contact", "contact_time"))
-        value = restitution(run)
+        wanted, value = run.value("contact", "restitution"), restitution(run)
+        share = run.value("run", "dt") / run.value("contact", "contact_time")
         cells = round(DIAMETER / float(run.grid.spacing[0]))
-        solver = str(run.value("contact", "solver"))
+        solver = run.value("contact", "solver")
         name = f"{solver}, step {share:g} contact times, {cells} cells per diameter: restitution"
         checks.close(name, value, wanted, BAND)
         if cells == COARSE and solver == "springs":
             found.append((share, value))
-    if not found:
-        return
-    steps, values = zip(*sorted(found), strict=True)
-    checks.figure(
-        "restitution under water",
-        "step / contact time",
-        "-",
-        {"ours": (steps, values)},
-        {"asked for": ([0.0, max(steps)], [wanted] * 2)},
-        smooth=True,
-    )
+    if found:
+        steps, values = zip(*sorted(found), strict=True)
+        curves = {"ours": (steps, values)}, {"asked for": ([0.0, max(steps)], [wanted] * 2)}
+        checks.figure("restitution under water", "step / contact time", "-", *curves, smooth=True)
