@@ -43,6 +43,11 @@ def differences(a: Path, b: Path) -> list[str]:
     return found
 
 
+def but_restarts(found: list[str]) -> list[str]:
+    """Differences apart from restart files of another time or name."""
+    return [line for line in found if not line.startswith("restart-")]
+
+
 def _in_file(a: Path, b: Path) -> list[str]:
     first, second = contents(a), contents(b)
     found = [f"{name} only in one file" for name in sorted(first.keys() ^ second.keys())]

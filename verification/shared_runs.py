@@ -35,26 +35,33 @@ def shared_run(tmp_path_factory: pytest.TempPathFactory) -> SharedRun:
     return results
 
 
+def program(*words: object, cwd: Path, **settings) -> subprocess.CompletedProcess[str]:
+    """What the program said, called on one thread from a folder."""
+    before, threads = settings.pop("before", ()), settings.pop("threads", 1)
+    stdin = {} if "input" in settings else {"stdin": subprocess.DEVNULL}
+    usual = {"capture_output": True, "text": True, "timeout": 300, "check": False} | stdin
+    command = [*before, ROOT / "mics", "--threads", threads, *words]
+    return subprocess.run(list(map(str, command)), cwd=cwd, **usual | settings)
+
+
 def run_text(
     work: Path, case: str, *words: str, folder: str = ".", **settings
 ) -> subprocess.CompletedProcess[str]:
-    """Write a case into a folder and run it, from there or from a folder in it, on one thread."""
+    """Write a case into a folder and run it, from there or from a folder in it."""
     work.mkdir(exist_ok=True)
     (work / "case.nml").write_text(case)
-    return subprocess.run(
-        [str(ROOT / "mics"), "--threads", "1", *words, str(work / "case.nml")],
-        cwd=work / folder,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-        **settings,
-    )
+    return program(*words, work / "case.nml", cwd=work / folder, **settings)
 
 
 def mics(work: Path, case: str, *words: str, **settings) -> subprocess.CompletedProcess[str]:
     """A quiet run of a case."""
     return run_text(work, case, "--quiet", *words, **settings)
+
+
+def told(work: Path, case: str, *words: str, **settings) -> tuple[int, str]:
+    """Exit code and messages of a quiet run of a case."""
+    done = mics(work, case, *words, **settings)
+    return done.returncode, done.stderr
 
 
 def results(work: Path, case: str) -> h5py.File:

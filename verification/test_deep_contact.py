@@ -88,38 +88,3 @@ def test_block_in_a_thin_plate_is_told(fixed: str, tmp_path: Path) -> None:
     overlap, _, _ = end_of(tmp_path)
     out_again = done.returncode == 0 and overlap < 0.05 * 0.001
     assert out_again or (done.returncode == 3 and "of the size of the smaller" in done.stderr)
-
-
-@pytest.mark.parametrize(
-    ("contact", "told"),
-    [
-        ("", ""),
-        ("contact_time = 0.01", ""),
-        ("contact_time = 1.0", "&contact contact_time = 1: blocks c give way by "),
-        ("contact_time = 0.05", "&contact contact_time = 0.05: blocks c give way by "),
-        ("law = 'constants'  k_n = 1e5", ""),
-        ("law = 'constants'  k_n = 100.0", "&contact k_n = 100: blocks c give way by "),
-        ("restitution = 0.0", "&contact restitution = 0: acts as 0.01"),
-    ],
-)
-def test_soft_blocks_are_warned_of(contact: str, told: str, tmp_path: Path) -> None:
-    """`--check` tells blocks that give way by more than 1 % of their size at rest."""
-    case = HEAD.format(end=1.0, size=0.04) + f"&contact {contact} /\n"
-    case += "&body shape = 'c'  position = 0.15, 0.15, 0.021 /\n"
-    done = mics(tmp_path, case, "--check")
-    warnings = [line for line in done.stdout.splitlines() if "&contact" in line]
-    assert done.returncode == 0
-    assert len(warnings) == (told != "")
-    assert told in "".join(warnings)
-
-
-def test_soft_supports_are_warned_of(tmp_path: Path) -> None:
-    """Small blocks that would give way under the heaviest one."""
-    case = HEAD.format(end=1.0, size=0.01) + "&contact contact_time = 0.008 /\n"
-    case += "&shape name = 'b'  kind = 'cube'  size = 0.1 /\n"
-    case += "&body shape = 'c'  position = 0.15, 0.15, 0.006 /\n"
-    alone = mics(tmp_path, case, "--check").stdout
-    case += "&body shape = 'b'  position = 0.15, 0.15, 0.1 /\n"
-    done = mics(tmp_path, case, "--check")
-    assert "give way" not in alone
-    assert "blocks c give way by" in done.stdout and "blocks b give way" not in done.stdout

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from shared_runs import run_text
+from shared_runs import told
 
 TANK = "&grid cells = 12, 12, 12  length = 1, 1, 1 /\n"
 LIGHT = """&run t_end = 0.03  dt = 0.01 /
@@ -22,8 +22,7 @@ DAM = """&run t_end = {t_end}  dt = {dt}  cfl_max = {cfl_max} /
 
 def mics(work: Path, groups: str, tank: str = TANK) -> tuple[int, str]:
     """Exit code and messages of a run."""
-    done = run_text(work, tank + groups, "--quiet")
-    return done.returncode, done.stderr
+    return told(work, tank + groups)
 
 
 def complete(work: Path, code: int) -> bool:

@@ -1,18 +1,21 @@
-"""What a run keeps that goes on from a restart file: its bits, its other restart file, its results
-where it is refused; and how a run ends."""
+"""What a run keeps that goes on from a restart file: its bits, its other restart file, which is
+named where one is no good, its results where it is refused; and how a run ends."""
 
 import random
 import resource
+import shutil
 import signal
+import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+from micstools.reading.reader import Run
 from run_cases import CASES
-from same_bits import differences
-from shared_runs import run_text
+from same_bits import but_restarts, differences
+from shared_runs import told as mics
 
 WET = """&run t_end = {t_end}  dt = 0.01  restart_interval = 0.01  field_interval = 0.01 /
 &grid cells = 8, 8, 8  length = 1, 1, 1 /
@@ -24,12 +27,6 @@ points 4
 tets 1
 1 2 3 4
 """
-
-
-def mics(work: Path, case: str, *words: str, **settings) -> tuple[int, str]:
-    """Exit code and messages of a quiet run."""
-    done = run_text(work, case, "--quiet", *words, **settings)
-    return done.returncode, done.stderr
 
 
 def numbers(path: Path) -> dict[str, np.ndarray]:
@@ -49,12 +46,9 @@ def go_on(tmp_path: Path, case: str) -> list[str]:
     code, said = mics(tmp_path, case, "--output", "whole")
     assert code == 0
     assert all(line.startswith("mics: warning: ") for line in said.splitlines())
-    files = sorted((tmp_path / "whole").glob("restart-?.h5"), key=lambda p: p.stat().st_mtime_ns)
-    assert len(files) == 2
-    older = f"whole/{files[0].name}"
-    assert mics(tmp_path, case, "--restart", older, "--output", "again")[0] == 0
-    found = differences(tmp_path / "whole", tmp_path / "again")
-    return [line for line in found if not line.startswith("restart-")]
+    older, _ = Run(tmp_path / "whole").restart_files
+    assert mics(tmp_path, case, "--restart", f"whole/{older}", "--output", "again")[0] == 0
+    return but_restarts(differences(tmp_path / "whole", tmp_path / "again"))
 
 
 @pytest.mark.parametrize("coupling", ["monolithic", "mics"])
@@ -199,3 +193,44 @@ def test_only_up_is_open_to_fall_back_from(tmp_path: Path) -> None:
     code, said = mics(tmp_path, case)
     assert code == 0
     assert "body 1 is out" in said
+
+
+@pytest.mark.parametrize("harm", ["cut", "changed", "gone"])
+@pytest.mark.parametrize(("bad", "good"), ["ab", "ba"])
+def test_other_file_is_named(bad: str, good: str, harm: str, tmp_path: Path) -> None:
+    """One file is no good: the message tells the command with the other one, and that goes on."""
+    case = WET.format(t_end=0.04)
+    assert mics(tmp_path, case) == (0, "")
+    file = tmp_path / "mics-out" / f"restart-{bad}.h5"
+    data = file.read_bytes()
+    at = len(data) // 2
+    harmed = {"cut": data[:at], "changed": data[:at] + b"x" * 2000 + data[at + 2000 :]}
+    file.unlink()
+    if harm != "gone":
+        file.write_bytes(harmed[harm])
+    code, said = mics(tmp_path, case, "--restart", f"mics-out/restart-{bad}.h5")
+    assert code == 4, said
+    hint = f"; the other one is there: --restart mics-out/restart-{good}.h5"
+    assert said.startswith(f"mics: mics-out/restart-{bad}.h5: ")
+    assert said.endswith(hint + "\n"), said
+    assert mics(tmp_path, case, "--restart", f"mics-out/restart-{good}.h5") == (0, "")
+
+
+def test_no_other_file(tmp_path: Path) -> None:
+    code, said = mics(tmp_path, WET.format(t_end=0.04), "--restart", "mics-out/restart-a.h5")
+    assert code == 4 and "the other one" not in said
+
+
+def test_disk_refuses(tmp_path: Path) -> None:
+    """A disk that cannot store a restart file (fsync fails): code 4, the older file stays whole."""
+    fault = ("strace", "-f", "-qq", "-o", "/dev/null", "-e", "inject=fsync:error=EIO:when=3")
+    if not shutil.which("strace") or subprocess.run([*fault, "true"]).returncode != 0:
+        pytest.skip("no strace, or it may not be used")
+    case = WET.format(t_end=0.04)
+    code, said = mics(tmp_path, case, before=fault)
+    assert code == 4, said
+    assert "restart-a.h5.part: cannot store: Input/output error" in said
+    left = sorted(path.name for path in (tmp_path / "mics-out").glob("restart*"))
+    assert left == ["restart-a.h5", "restart-b.h5"]
+    for name in left:
+        assert mics(tmp_path, case, "--restart", f"mics-out/{name}")[0] == 0

@@ -1,6 +1,5 @@
 """Units that pass an open side: they are out, and the run goes on as if they had gone."""
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,8 @@ import pytest
 from micstools.piles.pile import at_rest
 from micstools.reading import places
 from micstools.reading.reader import Run
-from run_cases import ROOT
+from shared_runs import told
 
-MICS = ROOT / "mics"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 SLIDE = """&run physics = 'dry'  t_end = 1  dt = 0.01 /
 &grid cells = 8, 8, 8  length = 1, 1, 1 /
 &boundary {side} /
@@ -31,10 +28,7 @@ RIVER = """&run t_end = 0.8  dt = 0.01  history_interval = 0 /
 
 def run(work: Path, case: str, *options: str) -> tuple[int, str, Run]:
     """Exit code, messages and results of a run."""
-    (work / "case.nml").write_text(case)
-    words = [str(MICS), "--threads", "1", "--quiet", *options, "case.nml"]
-    done = subprocess.run(words, cwd=work, capture_output=True, text=True, timeout=300, check=False)
-    return done.returncode, done.stderr, Run(work / "mics-out")
+    return *told(work, case, *options), Run(work / "mics-out")
 
 
 @pytest.mark.parametrize(
@@ -87,13 +81,10 @@ def test_a_restart_keeps_it_out(tmp_path: Path) -> None:
     case = SLIDE.format(side="x_max = 'open'", place="0.8, 0.5, 0.5", velocity="1.5, 0, 0")
     _, _, whole = run(tmp_path, case)
     wanted = whole.bodies.position, whole.bodies.exit_time
-    _, _, half = run(
-        tmp_path, case.replace("t_end = 1", "t_end = 0.5").replace("&run", "&run output = 'half'")
-    )
-    del half
-    files = list((tmp_path / "half").glob("restart-*.h5"))
     longer = case.replace("&run", "&run output = 'half'")
-    code, _, _ = run(tmp_path, longer, "--restart", str(files[0]))
+    run(tmp_path, longer.replace("t_end = 1", "t_end = 0.5"))
+    file = Run(tmp_path / "half").restart_files[0]
+    code, _, _ = run(tmp_path, longer, "--restart", f"half/{file}")
     again = Run(tmp_path / "half").bodies
     assert code == 0
     assert np.array_equal(again.position, wanted[0]) and np.array_equal(again.exit_time, wanted[1])

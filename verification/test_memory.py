@@ -1,17 +1,22 @@
-"""What a run will take in memory is planned; too much of it ends with a reason, nothing written."""
+"""What a run will take in memory is planned; too much of it ends with a reason, nothing written. So
+does too small a stack."""
 
+import os
 import re
 import resource
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from run_cases import ROOT
-from shared_runs import run_text
+from shared_runs import program, run_text
+from test_input import TANK
 
 MICS = ROOT / "mics"
+USUAL = "conservative"
 UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 CASE = """&run t_end = 2.0e-3  dt = 1.0e-3  field_interval = 1 /
 &grid cells = {cells}  length = 0.1, 0.1, 0.1 /
@@ -24,15 +29,17 @@ CASE = """&run t_end = 2.0e-3  dt = 1.0e-3  field_interval = 1 /
 
 
 def mics(
-    work: Path, cells: str, *options: str, limit: float = -1, momentum: str = "conservative"
+    work: Path,
+    cells: str,
+    *options: str,
+    limit: float = -1,
+    case: str = CASE,
+    momentum: str = USUAL,
 ) -> subprocess.CompletedProcess[str]:
     """Run a case in a folder, with so many bytes of memory at most."""
-    return run_text(
-        work,
-        CASE.format(cells=cells, momentum=momentum),
-        *options,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(limit), -1)),
-    )
+    bound = partial(resource.setrlimit, resource.RLIMIT_AS, (int(limit), -1))
+    text = case.format(cells=cells, momentum=momentum)
+    return run_text(work, text, *options, preexec_fn=bound)
 
 
 def planned(plan: str) -> tuple[float, str]:
@@ -48,15 +55,13 @@ def planned(plan: str) -> tuple[float, str]:
 def test_more_than_any_machine_has(cells: str, least: float, tmp_path: Path) -> None:
     """The plan counts beyond 32 bits and says that it is too much; a run ends at once."""
     case = CASE.replace("&body", "! body").replace("&shape", "! shape")
-    (tmp_path / "case.nml").write_text(case.format(cells=cells, momentum="conservative"))
-    done = subprocess.run(
-        [str(MICS), "--check", "case.nml"], cwd=tmp_path, capture_output=True, text=True
-    )
+    case = case.format(cells=cells, momentum=USUAL)
+    done = run_text(tmp_path, case, "--check")
     bytes_, said = planned(done.stdout)
     assert bytes_ > least
     if sys.platform == "linux":
         assert "MORE than the" in said and "that this machine has left" in said
-    done = subprocess.run([str(MICS), "case.nml"], cwd=tmp_path, capture_output=True, text=True)
+    done = run_text(tmp_path, case)
     assert done.returncode == 4, done.stderr
     assert re.match(r"mics: the run takes about \d[\d.e+]* TB of memory, ", done.stderr)
     assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
@@ -97,12 +102,36 @@ def test_a_block_on_the_floor_has_enough(tmp_path: Path) -> None:
         "0.05, 0.05, 0.06", "0.05, 0.05, 0.0125  fixed = .true.  velocity = 0, 0, 0.3"
     )
     case = case.replace("t_end = 2.0e-3", "t_end = 1.0e-2")
-    text = case.format(cells="48, 48, 48", momentum="conservative")
-    plan, _ = planned(run_text(tmp_path, text, "--check").stdout)
-    done = run_text(
-        tmp_path,
-        text,
-        "--quiet",
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(1.05 * plan + 11e6), -1)),
-    )
+    plan, _ = planned(mics(tmp_path, "48, 48, 48", "--check", case=case).stdout)
+    done = mics(tmp_path, "48, 48, 48", "--quiet", limit=1.05 * plan + 11e6, case=case)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+SMALL = TANK.replace("= 1 /", "= 0.01 /") + "&fluid water_level = 0.1 /\n"
+
+
+def stack_of(size: int) -> partial[None]:
+    """A limit of the stack [kB]."""
+    return partial(resource.setrlimit, resource.RLIMIT_STACK, (size * 1024, size * 1024))
+
+
+@pytest.mark.parametrize("name", ["blocks", "blocks_paper", "tetrapods"])
+def test_a_small_stack_is_enough(name: str, tmp_path: Path) -> None:
+    """Of 96 kB, also for each thread."""
+
+    text = re.sub(r"t_end = \S+", "t_end = 0.06", (ROOT / "input" / f"{name}.nml").read_text())
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    done = program("--quiet", cwd=tmp_path, input=text, threads=2, preexec_fn=stack_of(96))
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("size", ["16k", " 16 K", "16", "16384B", "32k"])
+def test_a_stack_that_is_too_small_is_refused(size: str, tmp_path: Path) -> None:
+    """Of a thread and of the program: exit code 2 and what is needed, nothing written."""
+    done = program(cwd=tmp_path, input=SMALL, env={**os.environ, "OMP_STACKSIZE": size})
+    assert done.returncode == 2
+    assert f"environment variable OMP_STACKSIZE = '{size.rstrip()}': the stack" in done.stderr
+    done = program(cwd=tmp_path, input=SMALL, preexec_fn=stack_of(60))
+    assert done.returncode == 2
+    assert "ulimit -s 60: the stack is too small, the program needs at least" in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -6,9 +6,11 @@ the plan says. `##` begins a remark, `$name` stands for a text of STARTS, `\\x1b
 """
 
 import re
+import resource
 import struct
 import subprocess
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,10 @@ STARTS = {
     "ball": "&shape name = 's' kind = 'sphere' size = 0.02 /\n",
     "cross": "&shape name = 'h' kind = 'hexapod' size = 0.02 /\n",
     "empty": "",
+    "soft": "&run t_end = 1 dt = 0.005 physics = 'dry' field_interval = 0 /\n"
+    "&grid cells = 4, 4, 4 length = 0.3, 0.3, 0.3 /\n",
+    "basin": "&run t_end = 10 /\n&grid cells = 40, 40, 40 length = 4, 4, 4 /\n",
+    "wide": "&run t_end = 1 physics = 'dry' /\n&grid cells = 6, 4, 5 length = 3*1e6 /\n",
     "head": HEAD,
     "nodes": HEAD + "$Nodes\n4\n1 0 0 0\n7 1 0 0\n9 0 1e-0 0\n4 0 0 1\n$EndNodes\n$Elements\n",
     "blocks": "$MeshFormat 4.1 0 8 $Nodes ",
@@ -40,6 +46,8 @@ NAMED = {
     "heightmap": "&bed file = 'f' kind = 'heightmap' /",
     "stl": "&bed file = 'f' kind = 'stl' /",
     "plan": "&shape name = 'cube' kind = 'cube' size = 0.02 / &drop file = 'f' /",
+    "motion": "&shape name = 'p' kind = 'box' size = 0.01, 0.06, 0.06 / "
+    "&body shape = 'p' fixed = T motion = 'f' /",
 }
 """The group that names the file of a row, by table."""
 
@@ -68,9 +76,10 @@ def expanded(text: str) -> bytes:
 
 
 def mics(folder: Path, *words: str, text: bytes = b"") -> subprocess.CompletedProcess[bytes]:
-    """Call the program in a folder with a case as its standard input."""
-    command = [str(ROOT / "mics"), *words]
-    return subprocess.run(command, cwd=folder, input=text, capture_output=True, timeout=60)
+    """Call the program in a folder with a case as its standard input; it has 20 s and 4 GB."""
+    command, memory = [str(ROOT / "mics"), *words], (resource.RLIMIT_AS, (4 << 30, 4 << 30))
+    return subprocess.run(command, cwd=folder, input=text, capture_output=True, timeout=20,
+                          preexec_fn=partial(resource.setrlimit, *memory))  # fmt: skip
 
 
 def messages(folder: Path, case: bytes) -> list[str]:
@@ -106,14 +115,14 @@ def of_file(folder: Path, table: str, content: bytes) -> list[str]:
     """Messages about a file of a case, without the group and its line."""
     (folder / "f").write_bytes(content)
     found = messages(folder, f"{RUN}{GRID}{NAMED[table]}\n".encode())
-    return [re.sub(r"^&\w+ file = 'f': (.*) \(line 3\)$", r"\1", line) for line in found]
+    return [re.sub(r"^&\w+ \w+ = 'f': (.*) \(line 3\)$", r"\1", line) for line in found]
 
 
 @pytest.mark.parametrize(
     ("table", "text", "told"), [(t, text, told) for t in NAMED for text, told in rows(t)]
 )
 def test_file(table: str, text: str, told: list[str], tmp_path: Path) -> None:
-    """A text as a shape, a bed or a plan."""
+    """A text as a shape, a bed, a plan or a way."""
     compare(of_file(tmp_path, table, expanded(text)), told)
 
 
@@ -220,6 +229,8 @@ PERIODIC = "x_min = 'periodic' x_max = 'periodic' y_min = 'slip' y_max = 'slip'"
         ("heightmap", slope(), {"top": 0.04}, "out of the tank"),
         ("heightmap", slope(), {"z": 0.06}, "the bed lies below the tank"),
         ("heightmap", slope(), {"sides": PERIODIC}, "as long as the period"),
+        ("heightmap", "2 2 0 0 .1 .1\n.01 .04 .01 .04", {"sides": PERIODIC}, "at both ends of a"),
+        ("heightmap", "2 2 0 0 .1 .1\n.01 .01 .01 .01", {"sides": PERIODIC}, ""),
         ("heightmap", "2 2 0 0 100 100\n20 20 20 20", {}, "are its coordinates in mm?"),
         ("stl", pyramid(0.03), {}, ""),
         ("stl", pyramid(0.03, how=-1), {}, "looks down with no solid above it"),

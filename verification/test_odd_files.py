@@ -10,6 +10,7 @@ import h5py
 import pytest
 
 from run_cases import ROOT
+from shared_runs import program
 
 MICS = ROOT / "mics"
 CASE = """&run t_end = 0.01  dt = 5.0e-3 /
@@ -19,17 +20,9 @@ CASE = """&run t_end = 0.01  dt = 5.0e-3 /
 """
 
 
-def mics(work: Path, *words: str, text: str | None = None) -> subprocess.CompletedProcess[str]:
+def mics(work: Path, *words: str, **settings) -> subprocess.CompletedProcess[str]:
     """Run the program in a folder; it has ten seconds."""
-    return subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", *words],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=10,
-        check=False,
-        **({"stdin": subprocess.DEVNULL} if text is None else {"input": text}),
-    )
+    return program("--quiet", *words, cwd=work, timeout=10, **settings)
 
 
 def case(fluid: str = "water_level = 0.5", groups: str = "") -> str:
@@ -94,8 +87,8 @@ def test_pipe_in_the_place_of_the_lock(tmp_path: Path) -> None:
 def test_pipes_that_have_a_writer(tmp_path: Path) -> None:
     """A case may come through a pipe: of the shell, or on standard input."""
     (tmp_path / "case.nml").write_text(case())
-    assert mics(tmp_path, "--check", text=case()).returncode == 0
-    assert mics(tmp_path, "--check", "/dev/stdin", text=case()).returncode == 0
+    assert mics(tmp_path, "--check", input=case()).returncode == 0
+    assert mics(tmp_path, "--check", "/dev/stdin", input=case()).returncode == 0
     for command in (
         "cat case.nml | {} --check",
         "{} --check < case.nml",
@@ -191,13 +184,9 @@ def test_threads_of_the_environment(given: str, code: int, tmp_path: Path) -> No
     (tmp_path / "case.nml").write_text(case())
     for words, wanted in (([], code), (["--threads", "1"], 0)):
         done = subprocess.run(
-            [str(MICS), "--check", *words, "case.nml"],
-            cwd=tmp_path,
-            env={**os.environ, "OMP_NUM_THREADS": given},
-            capture_output=True,
-            text=True,
-            timeout=10,
-        )
+            [MICS, "--check", *words, "case.nml"], cwd=tmp_path, text=True, capture_output=True,
+            env={**os.environ, "OMP_NUM_THREADS": given}, timeout=10,
+        )  # fmt: skip
         assert done.returncode == wanted, done.stderr
         assert wanted == 0 or "OMP_NUM_THREADS = " in done.stderr
 

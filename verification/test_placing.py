@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from micstools.reading.reader import Run
+from micstools.shapes.geometry import quaternion_from_axis, rotation_matrix
 from test_input import mics
 
 TANK = """&run t_end = 0.01  physics = 'dry'  dt = 0.01 /
@@ -79,28 +80,14 @@ def test_names_in_other_letters(tmp_path: Path) -> None:
             assert h5["bodies/name"][0].decode() == "Pfähle 7"
 
 
-def rotation(axis: str, angle_deg: float) -> np.ndarray:
-    """Turn about an axis of the tank."""
-    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
-    return {
-        "x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
-        "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
-        "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
-    }[axis]
-
-
 def test_angles_turn_as_documented(tmp_path: Path) -> None:
     """Roll about x, then pitch about y, then yaw about z; a quaternion of any length."""
     table = "shape,x,y,z,time,yaw_deg,pitch_deg,roll_deg\ncube,0.1,0.1,0.1,1,50,-20,110\n"
     assert mics([put(tmp_path, table)], tmp_path).returncode == 0
-    w, x, y, z = Run(tmp_path / "mics-out").bodies.quaternion[0, 0]
-    turned = rotation("z", 50) @ rotation("y", -20) @ rotation("x", 110)
-    own = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
-    assert own == pytest.approx(turned, abs=1e-12)
+    x, y, z = np.eye(3)
+    turns = [rotation_matrix(quaternion_from_axis(*turn)) for turn in ((z, 50), (y, -20), (x, 110))]
+    own = rotation_matrix(Run(tmp_path / "mics-out").bodies.quaternion[0, 0])
+    assert own == pytest.approx(np.linalg.multi_dot(turns), abs=1e-12)
 
 
 def test_a_long_plan_is_checked_quickly(tmp_path: Path) -> None:
@@ -262,34 +249,3 @@ def test_lowered_in_water_and_again_after_a_restart(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "again" / "run.h5") as h5:
         for name, whole in bodies.items():
             assert np.array_equal(h5["bodies"][name][:], whole), name
-
-
-IDLE = {
-    "release = 'touch'": "release = 'touch': needs lowering_speed above 0",
-    "release_height = 1": "release_height = 1: has no meaning with release = 'place'",
-    "lowering_speed = 1  release = 'height'": "release_height: missing, required",
-    "lowering_speed = 1  velocity = 0, 0, -1": "velocity = 0, 0, -1: has no meaning with "
-    "lowering_speed > 0",
-    "to = 1, 1, 1": "to = 1, 1, 1: has no meaning with count = 1",
-    "weights = 1, 2": "weights = 1, 2: has no meaning with one shape",
-    "shapes = 'cube', 'tetrapod'": "shape = 'cube': has no meaning with shapes",
-    "if_blocked = 'push'": "if_blocked = 'push': unknown, must be one of 'wait', 'raise', 'skip'",
-}
-"""Of a drop of cubes, and what is told."""
-
-
-@pytest.mark.parametrize("given", IDLE)
-def test_choices_without_meaning(given: str, tmp_path: Path) -> None:
-    """Variables that go with others only."""
-    text = f"{TANK}&drop shape = 'cube'  position = 0.1, 0.1, 0.1  {given} /"
-    done = mics([], tmp_path, text)
-    assert done.returncode == 2
-    assert IDLE[given] in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
-
-
-def test_weights_go_with_shapes(tmp_path: Path) -> None:
-    """One weight for each shape, of which one is above 0."""
-    drop = "&drop shapes = 'cube', 'tetrapod'  position = 0.1, 0.1, 0.1  weights = "
-    for given, told in (("1, 2, 3", "must be 2, one for each of shapes"), ("2*0", "above 0")):
-        done = mics([], tmp_path, f"{TANK}{drop}{given} /")
-        assert done.returncode == 2 and told in done.stderr, done.stderr

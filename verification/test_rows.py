@@ -1,17 +1,14 @@
 """What is told of blocks does not depend on how often rows are written."""
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import shared_runs
 from micstools.reading import block_numbers, places
 from micstools.reading.reader import Run
-from run_cases import ROOT
 
-MICS = ROOT / "mics"
-pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 CUBES = """&run t_end = {t_end}  dt = 0.01  physics = 'dry'  output = '{name}'
  history_interval = {rows}  stop_when_settled = {stop} /
 &grid cells = 8, 8, 8  length = 8, 8, 8 /
@@ -28,10 +25,8 @@ T_END = 1.72
 def told(work: Path, name: str, rows: float, t_end: float = T_END, stop: str = "F") -> Run:
     """The results of a run, gone on with once at its middle."""
     for end, more in ((t_end / 2, ()), (t_end, ("--restart", f"{name}/restart-a.h5"))):
-        case = work / f"{name}.nml"
-        case.write_text(CUBES.format(t_end=end, name=name, rows=rows, stop=stop))
-        words = [str(MICS), "--quiet", "--threads", "1", *more, case.name]
-        subprocess.run(words, cwd=work, check=True, timeout=300)
+        case = CUBES.format(t_end=end, name=name, rows=rows, stop=stop)
+        assert shared_runs.told(work, case, *more)[0] == 0
     return Run(work / name)
 
 

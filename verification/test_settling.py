@@ -1,16 +1,14 @@
 """`stop_when_settled`: a run ends when nothing moves and no block is to come any more."""
 
-import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from run_cases import ROOT
+from micstools.reading.reader import Run
 from shared_runs import mics
 
-MICS = ROOT / "mics"
 RELEASED = 0.2
 """When the second cube is due [s]."""
 CASE = """&run t_end = 5  dt = 0.01  physics = 'dry'  stop_when_settled = {stop}  rest_time = 0.3 /
@@ -106,12 +104,11 @@ def test_settles_in_water_that_sloshes(tmp_path: Path) -> None:
 
 def test_a_settled_run_has_no_more_to_do(tmp_path: Path) -> None:
     """Gone on with, it makes no step: an ensemble that is called again keeps its table."""
-    _, _, end = run(tmp_path, CASE.format(stop="T", count=1))
-    files = sorted((tmp_path / "mics-out").glob("restart-*.h5"), key=lambda p: p.stat().st_mtime_ns)
-    words = [str(MICS), "--threads", "1", "--quiet", "--restart", str(files[-1]), "case.nml"]
-    subprocess.run(words, cwd=tmp_path, timeout=120, check=True)
-    with h5py.File(tmp_path / "mics-out" / "run.h5") as h5:
-        assert float(h5["series/time"][-1]) == end
+    case = CASE.format(stop="T", count=1)
+    _, _, end = run(tmp_path, case)
+    newest = Run(tmp_path / "mics-out").restart_files[-1]
+    assert mics(tmp_path, case, "--restart", f"mics-out/{newest}").returncode == 0
+    assert Run(tmp_path / "mics-out").series.time[-1] == end
 
 
 @pytest.mark.parametrize(

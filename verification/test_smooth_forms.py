@@ -1,5 +1,5 @@
-"""Smooth forms that are cut finely touch as any other: stones on a floor, a beam on a crest; beds
-and constants that are refused, and who may sleep."""
+"""Smooth forms that are cut finely touch as any other: stones on a floor, a beam on a crest; and
+who may sleep."""
 
 import itertools
 from pathlib import Path
@@ -83,21 +83,6 @@ def test_a_beam_lies_on_a_crest(spacing: float, tmp_path: Path) -> None:
     assert height == pytest.approx(0.095, abs=5e-4)
 
 
-def test_a_bed_that_does_not_meet_itself_is_refused(tmp_path: Path) -> None:
-    """A slope from one periodic side to the other would have a cliff without a facet."""
-    case = """&run physics = 'dry'  t_end = 1 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &boundary x_min = 'periodic'  x_max = 'periodic' /
-    &bed file = 'slope.txt' /
-    """
-    for rise, wanted in ((0.2, 2), (0.0, 0)):
-        z = 0.2 + rise * np.array([0.0, 0.5, 1.0])
-        height_map(tmp_path / "slope.txt", np.tile(z, (2, 1)), 0.5, 1.0)
-        code, _, said = mics(tmp_path, case, "--check")
-        assert code == wanted, said
-        assert ("same height at both ends of a period" in said) == (wanted == 2)
-
-
 @pytest.mark.parametrize(("fixed", "asleep"), [(".true.", 1), (".false.", 0)])
 def test_only_what_is_held_up_sleeps(fixed: str, asleep: int, tmp_path: Path) -> None:
     """A stone lies on a raft in still oil: nothing keeps the two in their place."""
@@ -113,32 +98,3 @@ def test_only_what_is_held_up_sleeps(fixed: str, asleep: int, tmp_path: Path) ->
     assert code == 0
     assert all("was cut at its limit" in line for line in said.splitlines())  # a light raft
     assert series(tmp_path, "series/sleeping")[-1] == asleep
-
-
-def test_what_check_warns_of(tmp_path: Path) -> None:
-    case = """&run t_end = 1 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &boundary x_min = 'inflow'  x_min_velocity = 0.2, 0, 0 /
-    &water min = 0, 0, 0  max = 1, 1, 0.3 /
-    &shape name = 'a'  kind = 'cube'  size = 0.2 /
-    &drop shape = 'a'  position = 0.3, 0.5, 0.8  spread = 0.01, 0.01, 0 /
-    &drop shape = 'a'  position = 0.7, 0.5, 0.8  spread = 0.01, 0.01, 0 /
-    """
-    code, told, said = mics(tmp_path, case, "--check")
-    assert code == 0, said
-    assert "x_min = 'inflow': only gas comes in without &fluid water_level" in told
-    assert "&drop seed = 1: is that of another &drop too" in told
-    other = case.replace("position = 0.7", "seed = 2  position = 0.7")
-    code, told, _ = mics(tmp_path, other + "&fluid water_level = 0.3 /\n", "--check")
-    assert code == 0 and "only gas comes in" not in told and "&drop seed" not in told
-
-
-def test_contact_constants_that_cannot_be_stepped(tmp_path: Path) -> None:
-    """A force like the overlap to the power 0.9 is endlessly stiff at the first touch."""
-    case = """&run physics = 'dry'  t_end = 1 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &contact law = 'constants'  gamma_n = 0.9 /
-    """
-    code, _, said = mics(tmp_path, case, "--check")
-    assert code == 2
-    assert "gamma_n = 0.9: must lie between 1 and 10" in said

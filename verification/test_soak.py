@@ -1,6 +1,5 @@
 """A few trials of the long fault tests in soak/, which `make test` has time for."""
 
-import random
 import signal
 from pathlib import Path
 
@@ -10,10 +9,9 @@ from run_cases import ROOT, Machine
 from soak import (
     any_number,
     full_disk,
-    kills,
     memory,
     moved_folders,
-    mpi_signals,
+    signals,
     still_pile,
     two_programs,
 )
@@ -59,10 +57,10 @@ def test_lock_of_a_killed_run(shop: Shop, tmp_path: Path) -> None:
     assert two_programs.killed(shop, tmp_path / "run") == []
 
 
-@pytest.mark.parametrize("seconds", [0.05, 0.15, 0.25, 0.35])
+@pytest.mark.parametrize("seconds", [0.05, 0.1, 0.15, 0.2, 0.25, 0.35])
 def test_kill(disk_shop: Shop, seconds: float, tmp_path: Path) -> None:
     """What a killed run has written can be read, and goes on to the same bits."""
-    said, found = kills.trial(disk_shop, seconds, random.Random(1), tmp_path)
+    said, found = signals.trial(disk_shop, signal.SIGKILL, seconds, False, tmp_path)
     assert found == [], said
 
 
@@ -83,7 +81,7 @@ def parallel_shop(tmp_path_factory: pytest.TempPathFactory) -> Shop:
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1, signal.SIGKILL])
 def test_signal_to_mpirun(parallel_shop: Shop, number: int, tmp_path: Path) -> None:
     """The run ends in good order; what a process that is killed leaves behind goes on, too."""
-    said, found = mpi_signals.trial(parallel_shop, number, 1.0, False, tmp_path)
+    said, found = signals.trial(parallel_shop, number, 1.0, False, tmp_path)
     assert found == [], said
 
 

@@ -25,9 +25,9 @@ def make_run(tmp_path: Path):
     return lambda motion: Run(write_run(tmp_path / "run", motion))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def one_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser for the tests of a file."""
+    """A browser for all tests."""
     if MISSING:
         pytest.skip(MISSING)
     with Browser(tmp_path_factory.mktemp("browser")) as found:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from run_cases import MPI_SETTINGS
 from run_soak import Given
-from same_bits import LOCK, differences
+from same_bits import LOCK, but_restarts, differences
 from soak.shop import RESULTS, Shop, column, open_shop, processes_of, wrong_files
 
 WAYS = ("moved", "deleted", "emptied", "unseen", "unseen in place")
@@ -75,9 +75,7 @@ def wrong_results(whole: Path, folder: Path, way: str) -> list[str]:
         found = differences(whole, folder)
     except (OSError, RuntimeError, KeyError) as trouble:
         return [f"a file cannot be read: {trouble}"]
-    return [
-        line for line in found if not (way == "unseen in place" and line.startswith("restart-"))
-    ]
+    return but_restarts(found) if way == "unseen in place" else found
 
 
 def wrong_end(code: int, said: str, folder: Path, early: bool) -> list[str]:
@@ -101,9 +99,7 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
     still = processes_of(shop, first.pid)
     for pid in still:  # whatever it was about to do comes when the other is at work
         os.kill(pid, signal.SIGSTOP)
-    early = (
-        len(column(folder, "series/wall_time")) < len(column(shop.whole, "series/wall_time")) - 2
-    )
+    rows, whole = (len(column(path, "series/wall_time")) for path in (folder, shop.whole))
     disturb(way, folder, kept)
     second = second_run(shop, way, folder, work) if way in SECOND else None
     while second and second.poll() is None and not begun(folder, work, way):
@@ -111,7 +107,7 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
     for pid in still:
         os.kill(pid, signal.SIGCONT)
     said = first.communicate(timeout=120)[1]
-    found = wrong_end(first.returncode, said, folder, early)
+    found = wrong_end(first.returncode, said, folder, rows < whole - 2)
     if second is not None:
         end = second.communicate(timeout=120)[1]
         found += [] if second.returncode == 0 else [f"the second: {end.strip()}"]
@@ -132,10 +128,7 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
 def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
     """Every way in turn."""
     shop, draw = open_shop(given.machine(), work), random.Random(given.seed)
-    began = time.monotonic()
-    shop.run("--output", work / "timed")
-    whole = time.monotonic() - began
     for i in range(given.n or 100):
-        way, seconds = WAYS[i % len(WAYS)], draw.uniform(0.0, 0.7 * whole)
+        way, seconds = WAYS[i % len(WAYS)], draw.uniform(0.0, 0.7 * shop.seconds)
         said, found = trial(shop, way, seconds, work)
         yield f"{way:16} {seconds:6.3f} s {said}", found

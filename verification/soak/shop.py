@@ -3,15 +3,16 @@
 import os
 import shutil
 import subprocess
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from run_cases import MPI_SETTINGS, Machine
-from same_bits import LOCK, contents, differences
+from same_bits import LOCK, but_restarts, contents, differences
 
 CHANGING = {
     f"bodies/{name}"
@@ -58,6 +59,7 @@ class Shop:
     machine: Machine
     case: Path
     whole: Path
+    seconds: float = 0.0  # that this one took
 
     def start(self, *words: object, **more: object) -> subprocess.Popen[str]:
         """Begin a run of the case."""
@@ -71,19 +73,19 @@ class Shop:
 
     def unlike(self, folder: Path) -> list[str]:
         """What differs from the undisturbed run, restart files of other times apart."""
-        found = differences(self.whole, folder)
-        return [line for line in found if not line.startswith("restart-")]
+        return but_restarts(differences(self.whole, folder))
 
 
 def open_shop(machine: Machine, work: Path, text: str = CASE) -> Shop:
     """Make the undisturbed run."""
+    work.mkdir(exist_ok=True)
     case = work / "case.nml"
     case.write_text(text)
-    shop = Shop(machine, case, work / "whole")
+    shop, began = Shop(machine, case, work / "whole"), time.monotonic()
     code, said = shop.run("--output", shop.whole)
     if code != 0:
         raise RuntimeError(f"the undisturbed run fails: {said}")
-    return shop
+    return replace(shop, seconds=time.monotonic() - began)
 
 
 def restart_files(folder: Path) -> list[Path]:

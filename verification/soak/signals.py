@@ -1,12 +1,15 @@
-"""Signals to mpirun: the run ends in good order, and goes on to the same bits.
+"""Runs that are killed or stopped at any moment: what they wrote goes on to the same bits.
 
-50 times mpirun, with two to four processes of a short wet run, gets SIGTERM, SIGINT, SIGHUP or
-SIGUSR1 at a moment between its start and its end, or one of its processes is killed. Then must
-hold: all processes are gone within 20 s; result files can be read and have the rows of an
-undisturbed run; a run that had begun its steps, and was not killed, has a restart file of its last
-step and says how it ended; every restart file goes on to the same bits. Open MPI kills what is not
-gone a second after SIGTERM, SIGINT or SIGHUP; every other time it is told to wait for 5. (It then
-always does so, twice, however soon the processes are done.)
+`kills`: 200 times a short wet run is ended by kill -9 at a moment between its start and its end; of
+several processes one is killed. `signals`: 50 times mpirun, with two to four processes, gets
+SIGTERM, SIGINT, SIGHUP or SIGUSR1, or one of its processes is killed. Then must hold: all processes
+are gone within 20 s; every result file can be read to its last byte, and its complete rows and
+frames are those of an undisturbed run; a run that had begun its steps, and was not killed, has a
+restart file of its last step and says how it ended; each restart file goes on, in a copy and, the
+newest, in the same folder, to the same bits. Before the first one there is nothing to go on from,
+and a file may have been in the making: then a second run must take the folder. Open MPI kills what
+is not gone a second after SIGTERM, SIGINT or SIGHUP; every other time it is told to wait for 5. (It
+then always does so, twice, however soon the processes are done.) Words: kills, signals.
 """
 
 import os
@@ -81,16 +84,16 @@ def trial(
 
 
 def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
-    """Signals at random moments."""
-    shop = open_shop(replace(given.machine(parallel=True), ranks=2), work)
-    draw, whole = random.Random(given.seed), dict[int, float]()
-    for i in range(given.n or 50):
-        ranks = draw.choice((2, 2, 3, 4))
-        here = replace(shop, machine=replace(shop.machine, ranks=ranks))
-        if ranks not in whole:
-            began = time.monotonic()
-            here.run("--output", work / f"timed-{ranks}")
-            whole[ranks] = time.monotonic() - began
-        number, seconds = KINDS[i % len(KINDS)], draw.uniform(0.0, whole[ranks])
-        said, found = trial(here, number, seconds, bool(i % 2), work)
-        yield f"{ranks} ranks {signal.Signals(number).name:8} {seconds:6.3f} s {said}", found
+    """Kills and signals at random moments."""
+    draw = random.Random(given.seed)
+    for words in given.words or ("kills", "signals"):
+        parallel, shops = words == "signals", dict[int, Shop]()
+        for i in range(given.n or (50 if parallel else 200)):
+            ranks = draw.choice((2, 2, 3, 4)) if parallel else given.ranks
+            if ranks not in shops:
+                machine = replace(given.machine(parallel), ranks=ranks)
+                shops[ranks] = open_shop(machine, work / f"{words}-{ranks}")
+            number, shop = KINDS[i % len(KINDS)] if parallel else signal.SIGKILL, shops[ranks]
+            seconds = draw.uniform(0.0, shop.seconds)
+            said, found = trial(shop, number, seconds, bool(parallel and i % 2), work)
+            yield f"{ranks} ranks {signal.Signals(number).name:8} {seconds:6.3f} s {said}", found
