@@ -47,6 +47,8 @@ contains
     type(step_report_t), intent(in) :: report
     type(fault_t), intent(inout) :: fault
     character(:), allocatable :: overlap
+    type(courant_rate_t) :: rate
+    real(wp) :: courant
 
     if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
     if (.not. report%contacts_solved) call set(sim, 'a step would need more than a million body ' &
@@ -68,7 +70,12 @@ contains
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)
     call store_places(sim, fault)
-    if (sim%case%run%cfl_max <= 0.0_wp) call look_at_courant(sim, fault)
+    if (sim%case%run%cfl_max > 0.0_wp) return
+    rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)   ! nothing shortens the step
+    courant = sim%case%run%dt*max(rate%carried, rate%followed)
+    if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
+      //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
+      //' keeps it', fault)
   end subroutine find_fault
 
   !> A block moves as far as its speeds at both ends of the step and its weight let it; a cell more
@@ -91,20 +98,6 @@ contains
       end associate
     end do
   end subroutine look_for_jumps
-
-  !> With `cfl_max = 0` nothing shortens a step that is too long for the flow.
-  subroutine look_at_courant(sim, fault)
-    type(simulation_t), intent(in) :: sim
-    type(fault_t), intent(inout) :: fault
-    type(courant_rate_t) :: rate
-    real(wp) :: courant
-
-    rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
-    courant = sim%case%run%dt*max(rate%carried, rate%followed)
-    if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
-      //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
-      //' keeps it', fault)
-  end subroutine look_at_courant
 
   !> Every block must have a place that is a number, inside the tank.
   subroutine look_at_blocks(sim, fault)

@@ -20,8 +20,7 @@ program mics
   use placing_table_m, only: read_places
   use motion_file_m, only: read_motions
   use reference_m, only: reference_text
-  use case_check_m, only: make_shapes, check_case
-  use resolved_width_m, only: check_widths
+  use case_check_m, only: make_shapes, check_case, check_widths
   use case_plan_m, only: print_plan
   use case_warnings_m, only: find_case_warnings
   use set_up_file_m, only: write_set_up
@@ -48,7 +47,8 @@ program mics
   type(step_report_t) :: report
   type(fault_t) :: fault
   type(stop_requests_t) :: stop_requests
-  integer :: code, signal = 0
+  character(:), allocatable :: parameters, message, program_name
+  integer :: code, signal = 0, length
   real(wp) :: began   !! wall clock at the start [s]
 
   call parallel_init()
@@ -59,9 +59,13 @@ program mics
   call require_memory(case, shapes)
   call catch_signals()
   call simulation_init(case, shapes, bed, sim)
-  if (len(options%restart) > 0) call go_on()
-
-  call open_output(case, all_parameters(case, shapes, bed), options, sim%run_state_t, bed, output)
+  parameters = all_parameters(case, shapes, bed)
+  if (len(options%restart) > 0) then   ! the state from there in place of the initial one
+    call read_restart(options%restart, parameters, sim%run_state_t, code, message)
+    if (code /= 0) call fatal(merge(exit_input, exit_files, code == 2), message)
+    call resume(sim)
+  end if
+  call open_output(case, parameters, options, sim%run_state_t, bed, output)
   call stop_on_error()
   call measure(sim, report)
   if (len(options%restart) == 0) then   ! else what was due has been written
@@ -85,21 +89,16 @@ program mics
   call close_output(code, sim%run_state_t, report, output)
   call stop_on_error()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
-  if (code /= exit_ok) call fatal(code, stop_requests%reason//'; the run goes on with' &
-    //new_line('a')//'  '//restart_command(program_name(), nproc(), options, output%restart_file))
+  if (code /= exit_ok) then
+    call get_command_argument(0, length=length)
+    allocate (character(length) :: program_name)
+    call get_command_argument(0, program_name)
+    call fatal(code, stop_requests%reason//'; the run goes on with'//new_line('a')//'  ' &
+      //restart_command(program_name, nproc(), options, output%restart_file))
+  end if
   call parallel_final()
 
 contains
-
-  !> The program as it was called.
-  function program_name() result(name)
-    character(:), allocatable :: name
-    integer :: length
-
-    call get_command_argument(0, length=length)
-    allocate (character(length) :: name)
-    call get_command_argument(0, name)
-  end function program_name
 
   !> Options that end the program at once, and the number of threads.
   subroutine read_options()
@@ -127,6 +126,7 @@ contains
   subroutine read_and_check()
     type(problems_t) :: problems, warnings
     character(:), allocatable :: text, message
+    logical :: there
     integer :: n
 
     if (is_root()) call read_text(options%case_file, text, problems)   ! mpirun gives it the input
@@ -135,7 +135,7 @@ contains
     if (n > 0) call refuse(problems)
     call broadcast(text)
     call read_case(text, case, problems, warnings)
-    call look_beside(options%case_file, case)
+    call look_beside(options%case_file)
     call read_places(case, problems)
     call read_motions(case, problems)
     call make_shapes(case, shapes, problems)
@@ -145,7 +145,9 @@ contains
     call check_widths(case, shapes, problems)
     call check_initial_state(case, problems)
     call check_output(case, options, problems)
-    call check_plan_file(problems)
+    there = .false.
+    if (len(options%plan) > 0) inquire (file=options%plan, exist=there)
+    if (there) call problems%add('--plan', options%plan, 'is there already, must be a new file')
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) then
       call warnings%report(error_unit, 'mics: warning: ')
@@ -162,27 +164,6 @@ contains
     if (len(message) > 0) call fatal(exit_files, message)
     call finish()
   end subroutine read_and_check
-
-  !> The file of `--plan` must be new.
-  subroutine check_plan_file(problems)
-    type(problems_t), intent(inout) :: problems
-    logical :: there
-
-    if (len(options%plan) == 0) return
-    inquire (file=options%plan, exist=there)
-    if (there) call problems%add('--plan', options%plan, 'is there already, must be a new file')
-  end subroutine check_plan_file
-
-  !> State from a restart file in place of the initial one.
-  subroutine go_on()
-    character(:), allocatable :: message
-    integer :: info
-
-    call read_restart(options%restart, all_parameters(case, shapes, bed), sim%run_state_t, info, &
-      message)
-    if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)
-    call resume(sim)
-  end subroutine go_on
 
   !> End with code 2 after naming all problems.
   subroutine refuse(problems)

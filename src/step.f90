@@ -169,7 +169,7 @@ contains
     type(contact_report_t), intent(in) :: contact
     type(coupling_report_t), intent(in) :: stage
     type(step_report_t), intent(inout) :: report
-    logical :: any_free
+    logical :: any_free, all_there   ! nothing else moves or is to come, but for lack of room
 
     report%contact_energy = contact%energy
     report%contact_courant_max = contact%courant_max
@@ -177,8 +177,12 @@ contains
     report%contacts_solved = contact%info == 0
     any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
     call update_record(sim%clock%t, sim%clock%dt, sim%case%run%rest_speed, sim%blocks)
-    call sim%clock%store_speed(maxval(sim%blocks%speed), &
-                               any_free .and. nothing_to_come(sim%clock%t, sim%blocks))
+    all_there = any_free .and. nothing_to_come(sim%clock%t, sim%blocks)
+    if (.not. all_there .or. maxval(sim%blocks%speed) >= sim%case%run%rest_speed) then
+      sim%clock%rest_began = -1.0_wp
+    else if (sim%clock%rest_began < 0.0_wp) then
+      sim%clock%rest_began = sim%clock%t
+    end if
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes
@@ -200,6 +204,7 @@ contains
   subroutine release(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
+    type(fluid_sums_t) :: fluid
     logical :: released
 
     call follow_motions(sim%clock%t, sim%blocks)
@@ -209,21 +214,15 @@ contains
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
                         sim%next_let_go, report%warnings)
     if (.not. sim%wet) return
-    if (released) call displace_liquid(sim)
+    if (released) then   ! the liquid in their place raises the free surface
+      call voxelise(sim)
+      call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
+      call mix_fluid(sim%case%fluid, sim%flow)
+      fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+      call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
+    end if
     call first_force(sim)
   end subroutine release
-
-  !> The liquid in the place of blocks that have come raises the free surface.
-  subroutine displace_liquid(sim)
-    type(simulation_t), intent(inout) :: sim
-    type(fluid_sums_t) :: fluid
-
-    call voxelise(sim)
-    call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
-    call mix_fluid(sim%case%fluid, sim%flow)
-    fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
-  end subroutine displace_liquid
 
   !> A block that has just appeared gets the force of a fluid at rest when it is let go; after
   !! each step the fluid force of that step takes over.
@@ -261,8 +260,8 @@ contains
       sim%blocks)
   end subroutine begin
 
-  !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which
-  !! nobody reads the links and the effective aperture.
+  !> The blocks in the grid at their poses; where they were before stays in `sim%before`, whose
+  !! links and effective aperture are not used.
   subroutine voxelise(sim)
     type(simulation_t), intent(inout) :: sim
     type(solid_geometry_t), allocatable :: keep

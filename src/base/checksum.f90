@@ -58,25 +58,13 @@ contains
   subroutine checksum_add_text(self, text)
     class(checksum_t), intent(inout) :: self
     character(*), intent(in) :: text
-    integer :: first
+    integer :: first, i
 
     call self%add_words([int(len(text), int32)])
     do first = 1, len(text), 4*chunk
-      call self%add_words(int(ichar(characters(text(first:min(first + 4*chunk - 1, len(text))))), &
-        int32))
+      call self%add_words([(ichar(text(i:i), int32), i=first, min(first + 4*chunk - 1, len(text)))])
     end do
   end subroutine checksum_add_text
-
-  !> The characters of a text one by one.
-  pure function characters(text) result(c)
-    character(*), intent(in) :: text
-    character(1) :: c(len(text))
-    integer :: i
-
-    do i = 1, len(text)
-      c(i) = text(i:i)
-    end do
-  end function characters
 
   !> Checksum so far as 18 hexadecimal digits.
   function checksum_text(self) result(text)

@@ -35,8 +35,11 @@ contains
 
   module procedure parallel_init
     integer :: provided
+    integer(c_int) :: status
 
-    call yield_while_waiting()
+    ! A process that waits gives its core away, unless the user has it otherwise: with more
+    ! processes than cores Open MPI else waits for those that it keeps from running.
+    status = c_setenv('OMPI_MCA_mpi_yield_when_idle'//c_null_char, '1'//c_null_char, 0_c_int)
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
@@ -44,14 +47,6 @@ contains
     call MPI_Type_commit(accumulator_type)
     call MPI_Op_create(add_accumulators, .true., accumulator_sum)
   end procedure parallel_init
-
-  !> Let a process that waits give its core away, unless the user has it otherwise: with more
-  !! processes than cores Open MPI else waits for those that it keeps from running. Open MPI reads
-  !! this variable of the environment when it begins.
-  subroutine yield_while_waiting()
-    integer(c_int) :: status
-    status = c_setenv('OMPI_MCA_mpi_yield_when_idle'//c_null_char, '1'//c_null_char, 0_c_int)
-  end subroutine yield_while_waiting
 
   module procedure parallel_final
     call free_buffers()
@@ -81,10 +76,18 @@ contains
   !! The cuts lie at multiples of a power of two of the cell index, so that coarser grids can be
   !! cut at the same places; every process gets at least `min_cells` in a direction that is cut.
   module procedure decompose
+    integer, parameter :: exit_input = 2
     integer :: pieces(3), place(3), d
 
     pieces = best_pieces(n, n_processes)
-    if (product(pieces) /= n_processes) call refuse_pieces(n)
+    if (product(pieces) /= n_processes) then
+      if (rank == 0) write (error_unit, '(a, 2(i0, a), i0, a, i0, a, i0, a)') 'mics: ', n(1), &
+        ' x ', n(2), ' x ', n(3), ' cells cannot be cut for ', n_processes, &
+        ' processes with at least ', min_cells, &
+        ' cells in each direction that is cut; use fewer processes'
+      if (rank > 0) call parallel_pause(1.0_wp)
+      call parallel_abort(exit_input)
+    end if
     place(1) = modulo(rank, pieces(1))
     place(2) = modulo(rank/pieces(1), pieces(2))
     place(3) = rank/(pieces(1)*pieces(2))
@@ -98,18 +101,6 @@ contains
     at_side(1, :) = place == 0
     at_side(2, :) = place == pieces - 1
   end procedure decompose
-
-  !> Say that there are too many processes and end them all.
-  subroutine refuse_pieces(n)
-    integer, intent(in) :: n(3)
-    integer, parameter :: exit_input = 2
-
-    if (rank == 0) write (error_unit, '(a, 2(i0, a), i0, a, i0, a, i0, a)') 'mics: ', n(1), ' x ', &
-      n(2), ' x ', n(3), ' cells cannot be cut for ', n_processes, ' processes with at least ', &
-      min_cells, ' cells in each direction that is cut; use fewer processes'
-    if (rank > 0) call parallel_pause(1.0_wp)
-    call parallel_abort(exit_input)
-  end subroutine refuse_pieces
 
   !> Rank of the process one step away in direction d; itself or none where nothing is sent.
   pure function rank_beside(place, pieces, periodic, d, step) result(beside)

@@ -8,7 +8,7 @@ module value_text_m
   private
   public :: parse_real, parse_integer, parse_logical
   public :: quoted_text, printable, sanitise, fixed_text
-  public :: lower_case, nearest_name, edit_distance, looks_like_name
+  public :: lower_case, nearest_name, edit_distance
   public :: byte_order_mark
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
@@ -32,7 +32,7 @@ contains
     real(wp), intent(inout) :: x      !! changed only when `info` is `value_ok`
     integer, intent(out) :: info
     character(len(text)) :: word
-    integer :: mantissa_end, exponent, first, point, power, status
+    integer :: mantissa_end, exponent, first, point, power, status, i
 
     word = lower_case(text)
     info = value_malformed
@@ -44,7 +44,11 @@ contains
     exponent = 0
     if (mantissa_end < len(word)) then
       if (.not. is_whole(word(mantissa_end + 2:))) return
-      call small_integer(word(mantissa_end + 2:), exponent)
+      do i = mantissa_end + 2, len(word)   ! cut off at a million: enough to call it too large
+        if (scan(word(i:i), '+-') == 0) exponent = min(1000000, 10*exponent + iachar(word(i:i)) &
+          - iachar('0'))
+      end do
+      if (word(mantissa_end + 2:mantissa_end + 2) == '-') exponent = -exponent
       word(mantissa_end + 1:mantissa_end + 1) = 'e'
     end if
     first = scan(word(:mantissa_end), '123456789')
@@ -212,18 +216,6 @@ contains
     end do
   end function nearest_name
 
-  !> Could the word be a variable whose '=' was forgotten? (A logical could not.)
-  pure function looks_like_name(word) result(yes)
-    character(*), intent(in) :: word
-    logical :: yes
-    logical :: flag
-    integer :: info
-
-    flag = .false.
-    call parse_logical(word, flag, info)
-    yes = info /= value_ok .and. scan(lower_case(word(1:1)), 'abcdefghijklmnopqrstuvwxyz') == 1
-  end function looks_like_name
-
   !> Least number of letters to insert, delete, replace or swap (neighbours) that turns a into b.
   pure function edit_distance(a, b) result(distance)
     character(*), intent(in) :: a, b
@@ -291,19 +283,5 @@ contains
 
     yes = is_decimal(word) .and. index(word, '.') == 0
   end function is_whole
-
-  !> Value of a checked whole number, cut off at a million: enough to call an exponent too large.
-  pure subroutine small_integer(word, n)
-    character(*), intent(in) :: word
-    integer, intent(out) :: n
-    integer :: i
-
-    n = 0
-    do i = 1, len(word)
-      if (scan(word(i:i), '+-') == 1) cycle
-      n = min(1000000, 10*n + iachar(word(i:i)) - iachar('0'))
-    end do
-    if (word(1:1) == '-') n = -n
-  end subroutine small_integer
 
 end module value_text_m

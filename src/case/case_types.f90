@@ -60,7 +60,6 @@ module case_types_m
     logical :: single_phase = .false.
     real(wp) :: velocity(3) = 0.0_wp                !! uniform initial velocity [m/s]
     character(:), allocatable :: initial_state      !! HDF5 file; '': none
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     integer :: line = 0                             !! of the case file, where the group begins
   end type fluid_t
 
@@ -103,7 +102,6 @@ module case_types_m
     real(wp) :: size(3) = absent                    !! required [m]
     real(wp) :: density = 2300.0_wp                 !! [kg/m3]
     character(:), allocatable :: file
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     real(wp) :: scale = 1.0_wp
     integer :: refinement = 2
     character(name_length) :: spheres = 'centroid'
@@ -127,7 +125,6 @@ module case_types_m
     real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
     logical :: fixed = .false.
     character(:), allocatable :: motion             !! table that moves a fixed body; '': none
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     type(given_motion_t) :: path                    !! of the table
     logical :: attitude_given = .false.             !! by the case itself
     real(wp) :: release_time = 0.0_wp               !! [s]
@@ -162,7 +159,6 @@ module case_types_m
     character(name_length) :: shape = ''            !! required, or one of the next two
     character(name_length) :: shapes(max_drop_shapes) = ''   !! drawn by weight
     character(:), allocatable :: file               !! with a table of places
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(:), allocatable :: checksum           !! of the table
     type(place_t), allocatable :: row(:)            !! of the table
     real(wp) :: weights(max_drop_shapes) = [1.0_wp, spread(absent, 1, max_drop_shapes - 1)]
@@ -183,7 +179,6 @@ module case_types_m
 
   type :: start_t
     character(:), allocatable :: file               !! run.h5 of another run; '': none
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     real(wp) :: time = -1.0_wp                      !! of that run [s]; -1: its end
     real(wp) :: shift(3) = 0.0_wp                   !! [m]
     integer :: line = 0                             !! of the case file, where the group begins
@@ -200,7 +195,6 @@ module case_types_m
 
   type :: bed_input_t
     character(:), allocatable :: file
-    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(name_length) :: kind = 'heightmap'
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! its file is not known

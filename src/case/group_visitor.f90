@@ -16,7 +16,7 @@ module group_visitor_m
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
     edit_distance, quoted_text, printable, sanitise, value_ok, value_not_finite, value_too_large, &
-    value_not_whole, value_malformed, looks_like_name
+    value_not_whole, value_malformed, lower_case
   implicit none
   private
   public :: group_visitor_t
@@ -174,7 +174,7 @@ contains
   end subroutine without_meaning
 
   !> Variables that have no meaning because of the physics that was chosen: those given are passed
-  !! over with a warning, see `idle_variables_m`.
+  !! over with a warning, see `find_idle`.
   subroutine pass_over(self, variables, chosen)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variables   !! one blank between them
@@ -413,8 +413,11 @@ contains
     class(group_visitor_t), intent(inout) :: self
     integer :: i
     character(:), allocatable :: what
-    integer :: j, fewest
+    character(*), parameter :: small = 'abcdefghijklmnopqrstuvwxyz'
+    integer :: j, fewest, info
+    logical :: flag
 
+    flag = .false.
     associate (entry => self%entry(self%n))
       if (entry%required) call self%needed(entry%name, entry%with_unit())
       i = self%group%find(entry%name)
@@ -429,7 +432,9 @@ contains
         what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//' given, '//what &
           //' needed'
         do j = 2, a%n
-          if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
+          if (a%value(j)%quoted) cycle   ! else it may be a variable whose '=' was forgotten
+          call parse_logical(a%value(j)%text, flag, info)
+          if (info == value_ok .or. scan(lower_case(a%value(j)%text(1:1)), small) == 0) cycle
           what = what//'; is an ''='' missing after '//printable(a%value(j)%text)//'?'
           exit
         end do

@@ -6,7 +6,7 @@ module motion_file_m
   use kinds_m, only: wp, name_length, pi
   use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm, normalised
-  use case_types_m, only: case_t, body_input_t, is_given
+  use case_types_m, only: case_t, is_given
   use csv_table_m, only: csv_table_t, read_table
   use named_files_m, only: found_file
   use given_motion_m, only: given_motion_init, pose_at
@@ -27,52 +27,47 @@ contains
   subroutine read_motions(case, problems)
     type(case_t), intent(inout) :: case
     type(problems_t), intent(inout) :: problems
-    integer :: b
-
-    do b = 1, size(case%body)
-      if (.not. allocated(case%body(b)%motion)) cycle
-      if (len_trim(case%body(b)%motion) > 0) call read_motion(case%body(b), problems)
-    end do
-  end subroutine read_motions
-
-  !> Read the table of a body.
-  subroutine read_motion(body, problems)
-    type(body_input_t), intent(inout) :: body
-    type(problems_t), intent(inout) :: problems
     type(problems_t) :: found
     type(csv_table_t) :: table
     real(wp), allocatable :: time(:), x(:, :), q(:, :)
     real(wp) :: place(3), attitude(4), v(3), omega(3)
     logical :: turns
-    integer :: i
+    integer :: b, i
 
-    call read_table(found_file(body%folder, body%motion), table, found)
-    if (size(table%name) > 0) then
-      call table%check_names(columns, n_required, found)
-      turns = any([(table%column(columns(i)) > 0, i=n_required + 1, size(columns))])
-      if (turns .and. body%attitude_given) call found%add_message('has an attitude, and so has ' &
-        //'the &body; give one only')
-      if (found%n == 0) call read_rows(table, turns, body%quaternion, time, x, q, found)
-    end if
-    do i = 1, found%n
-      call problems%add_message('&body motion = '//quoted_text(body%motion)//': ' &
-        //found%message(i), body%line)
+    do b = 1, size(case%body)
+      if (.not. allocated(case%body(b)%motion)) cycle
+      if (len_trim(case%body(b)%motion) == 0) cycle
+      found = problems_t()
+      associate (body => case%body(b))
+        call read_table(found_file(body%motion), table, found)
+        if (size(table%name) > 0) then
+          call table%check_names(columns, n_required, found)
+          turns = any([(table%column(columns(i)) > 0, i=n_required + 1, size(columns))])
+          if (turns .and. body%attitude_given) call found%add_message('has an attitude, and so ' &
+            //'has the &body; give one only')
+          if (found%n == 0) call read_rows(table, turns, body%quaternion, time, x, q, found)
+        end if
+        do i = 1, found%n
+          call problems%add_message('&body motion = '//quoted_text(body%motion)//': ' &
+            //found%message(i), body%line)
+        end do
+        body%faulty = body%faulty .or. found%n > 0
+        if (found%n > 0) cycle
+        call given_motion_init(time, x, q, body%path)
+        call pose_at(body%path, max(body%release_time, 0.0_wp), place, attitude, v, omega)
+        if (is_given(body%position(1))) then
+          if (norm(body%position - place) > same_place) then
+            call problems%add_message('&body position = '//to_text(body%position) &
+              //': motion = '//quoted_text(body%motion)//' has the body at '//to_text(place) &
+              //' then; leave position away, or give that', body%line)
+            body%faulty = .true.
+          end if
+        end if
+        body%position = place
+        body%quaternion = attitude
+      end associate
     end do
-    body%faulty = body%faulty .or. found%n > 0
-    if (found%n > 0) return
-    call given_motion_init(time, x, q, body%path)
-    call pose_at(body%path, max(body%release_time, 0.0_wp), place, attitude, v, omega)
-    if (is_given(body%position(1))) then
-      if (norm(body%position - place) > same_place) then
-        call problems%add_message('&body position = '//to_text(body%position) &
-          //': motion = '//quoted_text(body%motion)//' has the body at '//to_text(place) &
-          //' then; leave position away, or give that', body%line)
-        body%faulty = .true.
-      end if
-    end if
-    body%position = place
-    body%quaternion = attitude
-  end subroutine read_motion
+  end subroutine read_motions
 
   !> The rows of a table, with every problem of any of its cells.
   subroutine read_rows(table, turns, attitude, time, x, q, problems)

@@ -62,7 +62,7 @@ contains
     type(csv_table_t) :: table
     integer :: column(size(known)), r, k
 
-    call read_table(found_file(drop%folder, drop%file), table, problems)
+    call read_table(found_file(drop%file), table, problems)
     drop%count = table%n_rows
     allocate (drop%row(table%n_rows))
     if (size(table%name) == 0) return

@@ -37,6 +37,7 @@ contains
     type(shape_t), intent(out) :: solid
     type(parts_t) :: parts
     real(wp) :: p(3, max_clip_corners), low(3), high(3)
+    real(wp), allocatable :: floor(:, :)
     integer :: d, f, n, beyond(3)
 
     beyond = merge(n_halo + 1, 0, grid%periodic)
@@ -49,26 +50,20 @@ contains
     do f = 1, size(bed%triangle, 2)
       call facet_within(bed, f, low, high, n, p)
       call clip_polygon(3, low(3), 1.0_wp, n, p)
-      if (n < 3 .or. lies_in_side(p(:, :n), low, high)) cycle
+      if (n < 3) cycle
+      ! in a side walls are put anyway
+      if (any(all(p(:2, :n) <= spread(low(:2), 2, n), 2)) &
+          .or. any(all(p(:2, :n) >= spread(high(:2), 2, n), 2))) cycle
       call add_facet(p(:, :n), parts)
-      call add_floor(p(:, :n), low(3), parts)
+      ! the floor of the prism under it; that under a vertical one has no area and no effect
+      floor = p(:, n:1:-1)
+      floor(3, :) = low(3)
+      call add_facet(floor, parts)
       call add_walls(p(:, :n), low, high, parts)
       call add_prism(p(:, :n), low(3), min_tet*grid%volume, parts)
     end do
     call make_shape_of(parts, centre, solid)
   end subroutine make_bed_solid
-
-  !> Does a polygon lie in a side of the grid? Walls are put there anyway.
-  pure function lies_in_side(p, low, high) result(yes)
-    real(wp), intent(in) :: p(:, :), low(3), high(3)   !! [m]
-    logical :: yes
-    integer :: d
-
-    yes = .false.
-    do d = 1, 2
-      yes = yes .or. all(p(d, :) <= low(d)) .or. all(p(d, :) >= high(d))
-    end do
-  end function lies_in_side
 
   !> Append a polygon of the surface.
   subroutine add_facet(p, parts)
@@ -85,17 +80,6 @@ contains
       parts%corner(:, parts%n_corner) = p(:, v)
     end do
   end subroutine add_facet
-
-  !> The floor of the prism under a polygon; that under a vertical one has no area and no effect.
-  subroutine add_floor(p, bottom, parts)
-    real(wp), intent(in) :: p(:, :), bottom   !! [m]
-    type(parts_t), intent(inout) :: parts
-    real(wp) :: q(3, size(p, 2))
-
-    q = p(:, size(p, 2):1:-1)
-    q(3, :) = bottom
-    call add_facet(q, parts)
-  end subroutine add_floor
 
   !> Walls of the prism under a polygon where it reaches a side of the grid; the others are hidden
   !! by the prisms next to it.

@@ -76,7 +76,7 @@ contains
     type(shape_t), intent(in) :: shape
     type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
-    real(wp) :: r(3, 3), centre(3), tolerance(3), x
+    real(wp) :: r(3, 3), centre(3), tolerance(3), x, plane
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
@@ -92,7 +92,11 @@ contains
         x = centre(d) + dot_product(r(d, :), shape%point(:, v))/grid%h(d)
         if (abs(x - anint(x)) < tolerance(d)) x = anint(x)
         work%point(d, v) = x
-        work%seen(d, v) = off_centres(x, centre(d), tolerance(d))
+        ! as the centres of cells see it: what lies in a plane of centres, but for a little, lies a
+        ! little beyond it, seen from the middle of the body
+        plane = floor(x) + 0.5_wp
+        if (abs(x - plane) < tolerance(d)) x = plane + sign(tolerance(d), x - centre(d))
+        work%seen(d, v) = x
       end do
     end do
     n = size(shape%facet) - 1
@@ -119,18 +123,5 @@ contains
       self%corner(:, :, m) = work%point(:, shape%flow_tet(:, m))
     end do
   end subroutine place_corners
-
-  !> Coordinate of a corner as the centres of cells see it: what lies in a plane of centres, but for
-  !! a little, lies a little beyond it, seen from the middle of the body.
-  elemental function off_centres(x, middle, little) result(moved)
-    real(wp), intent(in) :: x        !! [cells]
-    real(wp), intent(in) :: middle   !! of the body [cells]
-    real(wp), intent(in) :: little   !! [cells]
-    real(wp) :: moved, plane
-
-    moved = x
-    plane = floor(x) + 0.5_wp
-    if (abs(x - plane) < little) moved = plane + sign(little, x - middle)
-  end function off_centres
 
 end module body_shares_m

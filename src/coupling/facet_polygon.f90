@@ -27,7 +27,8 @@ contains
 
     if (low >= real(i - 1, wp)) then
       if (high <= real(i, wp)) then
-        call copy_polygon(p, part)
+        part%n = p%n
+        part%x(:, :p%n) = p%x(:, :p%n)
       else
         call clip(p, d, real(i, wp), .false., part)
       end if
@@ -38,14 +39,6 @@ contains
       call clip(above, d, real(i, wp), .false., part)
     end if
   end subroutine clip_to_cells
-
-  pure subroutine copy_polygon(p, q)
-    type(polygon_t), intent(in) :: p
-    type(polygon_t), intent(inout) :: q
-
-    q%n = p%n
-    q%x(:, :p%n) = p%x(:, :p%n)
-  end subroutine copy_polygon
 
   !> Keep the part of a polygon above or below a plane, both with the plane itself.
   pure subroutine clip(p, d, plane, keep_above, part)

@@ -348,7 +348,8 @@ contains
           if (any((i < 1 .or. low < 1 .or. i > grid%n) .and. .not. grid%periodic)) cycle
           rigid = wall_velocity(self%bodies%motion(:, b), &
                                 nearest_arm(grid, solid%face_centroid(:, m), self%bodies%x(:, b)))
-          share = mass_share(solid%face_beta(m), body_density(self%bodies, b), face_mean( &
+          share = solid%face_beta(m)*body_density(self%bodies, b)   ! of the mass at the face
+          share = share/(share + (1.0_wp - solid%face_beta(m))*face_mean( &
             flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
           flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &
               - flow%uf(i(1), i(2), i(3), d))
@@ -362,13 +363,5 @@ contains
                       report%pressure%divergence)
     end associate
   end subroutine overlay_bodies
-
-  !> Share of the solid in the mass at a face that it covers by `beta`.
-  elemental function mass_share(beta, rho_solid, rho_fluid) result(share)
-    real(wp), intent(in) :: beta, rho_solid, rho_fluid
-    real(wp) :: share
-
-    share = beta*rho_solid/(beta*rho_solid + (1.0_wp - beta)*rho_fluid)
-  end function mass_share
 
 end module mass_average_m

@@ -226,7 +226,7 @@ contains
       call force_from_tension(grid, bodies, flux, self%tension, force(:, :, by_old_pressure))
       self%defect = mass_defect(grid, self%fluid, s%solid, bodies, flux, flow)
       self%held = held_mass(grid, bodies, flux, flow%rho)
-      call count_fluid(self%fluid%gravity, s%dt, self)
+      call set_fluid_inertia(self%fluid%gravity, s%dt, self)
       call move_by_forces(s%dt, self)
     end associate
     call give(s%scratch, self%tension%force)
@@ -366,7 +366,7 @@ contains
       by_pressure = by_pressure + from_faces
       call force_of_walls(grid, self%merged, bodies, self%at_start, s%dt, self%balance, of_walls)
       ! less what they bear as the fluid that no aperture counts moves with the bodies, which
-      ! `count_fluid` has given them
+      ! `set_fluid_inertia` has given them
       do b = 1, bodies%n
         inertia = symmetric(self%defect(:, :, b) + self%held(:, :, b))
         of_walls(1:3, b) = of_walls(1:3, b) - matmul(inertia(1:3, :), &
@@ -393,7 +393,7 @@ contains
   !> Give free bodies the inertia of the fluid that the faces do not count, and the force of it as
   !! far as it is known before the solve: -defect (g - a), a by weight and contact, or by the given
   !! motion.
-  subroutine count_fluid(gravity, dt, self)
+  subroutine set_fluid_inertia(gravity, dt, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
     class(monolithic_t), intent(inout) :: self
@@ -410,7 +410,7 @@ contains
       self%force(:, b, by_displaced) = matmul(inertia, self%bodies%motion(:, b) &
         - self%at_start%motion(:, b))/dt - matmul(self%defect(:, :, b), gravity)
     end do
-  end subroutine count_fluid
+  end subroutine set_fluid_inertia
 
   !> A defect as an inertia, without that of rotations.
   pure function symmetric(defect) result(inertia)
@@ -454,7 +454,7 @@ contains
       call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
       self%defect = mass_defect(grid, self%fluid, solid, bodies, system%operator%flux, flow)
-      call count_fluid(weightless, dt, self)
+      call set_fluid_inertia(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
       call solve_pressure(release, flow%rho, bodies, self%pressure)

@@ -145,7 +145,7 @@ contains
     type(blocks_t), intent(inout) :: blocks
     real(wp), intent(out) :: next             !! huge if there is none [s]
     integer, intent(inout) :: warnings        !! counted up
-    real(wp) :: left, way, gap
+    real(wp) :: left, way, gap, weight, carried   ! [m], [N]
     integer :: b
 
     next = huge(next)
@@ -157,7 +157,11 @@ contains
         left = way
         if (handling%release == 'height') left = max(0.0_wp, way - handling%release_height)
         left = min(left, blocks%x(3, b) - blocks%goal(b))
-        if (time > blocks%entry_time(b) .and. is_slack(gravity, b, blocks)) left = 0.0_wp
+        ! what it lies on carries it, all but a small share of its weight: the sling is slack
+        weight = -own_mass(blocks, b)*gravity(3)
+        carried = weight - blocks%fluid_force(3, b) - blocks%contact_force(3, b)
+        if (time > blocks%entry_time(b) .and. blocks%contact_force(3, b) > 0.0_wp &
+            .and. carried < slack_share*weight) left = 0.0_wp
         if (left > gap) then
           if (left < nothing_below) next = min(next, time + left/handling%lowering_speed)
           cycle
@@ -170,19 +174,6 @@ contains
       end associate
     end do
   end subroutine let_go_lowered
-
-  !> Does what a held block lies on carry it, all but a small share of its weight?
-  pure function is_slack(gravity, b, blocks) result(yes)
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    integer, intent(in) :: b
-    type(blocks_t), intent(in) :: blocks
-    logical :: yes
-    real(wp) :: weight, carried
-
-    weight = -own_mass(blocks, b)*gravity(3)
-    carried = weight - blocks%fluid_force(3, b) - blocks%contact_force(3, b)
-    yes = blocks%contact_force(3, b) > 0.0_wp .and. carried < slack_share*weight
-  end function is_slack
 
   !> Which blocks are due and not there yet.
   pure function is_due(time, blocks) result(due)

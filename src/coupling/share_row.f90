@@ -57,7 +57,7 @@ contains
     type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
     type(polygon_t) :: facet, piece
-    integer :: m, first, last
+    integer :: m, first, last, flat
 
     work%volume(:, self%low(1):self%high(1), self%low(3):self%high(3)) = 0.0_wp
     work%area(:, self%low(1):self%high(1), self%low(3):self%high(3), :) = 0.0_wp
@@ -70,19 +70,13 @@ contains
       call load_facet(shape, m, work%point, facet)
       if (work%low(2, m) <= real(j - 1, wp)) call lines_in_plane(facet, real(j - 1, wp), work)
       call clip_to_cells(facet, 2, j, work%low(2, m), work%high(2, m), piece)
-      call sum_columns(piece, j, flat_direction(work%low(:, m), work%high(:, m)), work)
+      do flat = 3, 1, -1   ! the grid plane it lies in, if it does
+        if (work%high(flat, m) <= work%low(flat, m) &
+            .and. abs(work%low(flat, m) - anint(work%low(flat, m))) <= 0.0_wp) exit
+      end do
+      call sum_columns(piece, j, flat, work)
     end do
   end subroutine sum_row
-
-  !> Direction of the grid plane in which a facet lies, 0 if it does not.
-  pure function flat_direction(low, high) result(d)
-    real(wp), intent(in) :: low(3), high(3)   !! box around the facet [cells]
-    integer :: d
-
-    do d = 3, 1, -1
-      if (high(d) <= low(d) .and. abs(low(d) - anint(low(d))) <= 0.0_wp) return
-    end do
-  end function flat_direction
 
   !> The corners of a facet [cells].
   pure subroutine load_facet(shape, m, point, facet)

@@ -144,7 +144,9 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(inout) :: self
-    integer :: b, t
+    real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    logical :: changed
+    integer :: b
 
     if (size(self%work) < omp_get_max_threads()) then
       deallocate (self%work)
@@ -156,44 +158,23 @@ contains
       call find_images(grid, b, blocks%x(:, b), blocks%shapes(blocks%shape(b))%radius, &
                        self%voxels)
     end do
-    !$omp parallel do private(t) schedule(dynamic, 1) if (count(self%voxels%near) > 1)
+    !$omp parallel do private(changed) schedule(dynamic, 1) if (count(self%voxels%near) > 1)
     do b = 1, blocks%n
       if (.not. self%voxels%near(b)) cycle
-      t = omp_get_thread_num()
-      call shares_of_body(grid, blocks, b, self%subcells, self%work(t), self%body(b))
+      associate (work => self%work(omp_get_thread_num()), body => self%body(b))
+        call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), &
+                              blocks%q(:, b), work%row, body, changed)
+        if (changed .and. self%subcells > 0) call count_subcells(self%subcells, work%count, body)
+        if (changed) call list_cut_tets(work%tets, body)
+      end associate
     end do
-    if (self%has_bed) call shares_of_bed(grid, self)
-  end subroutine find_shares
-
-  !> Shares of body b, by the work arrays of a thread.
-  subroutine shares_of_body(grid, blocks, b, subcells, work, body)
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: b
-    integer, intent(in) :: subcells   !! per direction, 0: exact shares
-    type(share_work_t), intent(inout) :: work
-    type(body_shares_t), intent(inout) :: body
-    logical :: changed
-
-    call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), blocks%q(:, b), &
-                          work%row, body, changed)
-    if (.not. changed) return
-    if (subcells > 0) call count_subcells(subcells, work%count, body)
-    call list_cut_tets(work%tets, body)
-  end subroutine shares_of_body
-
-  !> Shares of the bed, which is near everywhere and has no images.
-  subroutine shares_of_bed(grid, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_fraction_t), intent(inout) :: self
-    real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    logical :: changed
-
+    if (.not. self%has_bed) return
+    ! the bed is near everywhere and has no images
     self%voxels%near(size(self%body)) = .true.
-    associate (body => self%body(size(self%body)), work => self%work(0))
+    associate (work => self%work(0), body => self%body(size(self%body)))
       call find_body_shares(grid, self%bed, self%bed_centre, upright, work%row, body, changed)
       if (changed) call list_cut_tets(work%tets, body)
     end associate
-  end subroutine shares_of_bed
+  end subroutine find_shares
 
 end module solid_fraction_m

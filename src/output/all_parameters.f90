@@ -4,7 +4,7 @@
 module all_parameters_m
   use errors_m, only: to_text
   use checksum_m, only: checksum_t
-  use case_types_m, only: case_t, place_t
+  use case_types_m, only: case_t
   use case_input_m, only: parameters_text
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
@@ -20,8 +20,8 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
     character(:), allocatable :: text
-    type(checksum_t) :: of_shape, of_path, of_start
-    integer :: i
+    type(checksum_t) :: of_shape, of_places, of_path, of_start
+    integer :: i, r
 
     text = parameters_text(case)
     do i = 1, size(shapes)
@@ -33,7 +33,15 @@ contains
     end do
     do i = 1, size(case%drop)
       if (.not. allocated(case%drop(i)%row)) cycle
-      call add_line('the places of &drop '//to_text(i), checksum_of_places(case%drop(i)%row))
+      of_places = checksum_t()
+      do r = 1, size(case%drop(i)%row)
+        associate (row => case%drop(i)%row(r))
+          call of_places%add_text(row%shape//row%name)
+          call of_places%add_reals(11, [row%x, row%q, row%v, row%time])
+          call of_places%add_integers(1, [merge(1, 0, row%fixed)])
+        end associate
+      end do
+      call add_line('the places of &drop '//to_text(i), of_places%text())
     end do
     do i = 1, size(case%body)
       associate (path => case%body(i)%path)
@@ -66,20 +74,5 @@ contains
       text = text//'! checksum of '//what//' '//checksum//new_line('a')
     end subroutine add_line
   end function all_parameters
-
-  !> A checksum of the rows of a table of places.
-  function checksum_of_places(row) result(text)
-    type(place_t), intent(in) :: row(:)
-    character(:), allocatable :: text
-    type(checksum_t) :: checksum
-    integer :: r
-
-    do r = 1, size(row)
-      call checksum%add_text(row(r)%shape//row(r)%name)
-      call checksum%add_reals(11, [row(r)%x, row(r)%q, row(r)%v, row(r)%time])
-      call checksum%add_integers(1, [merge(1, 0, row(r)%fixed)])
-    end do
-    text = checksum%text()
-  end function checksum_of_places
 
 end module all_parameters_m

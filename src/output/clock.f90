@@ -31,7 +31,7 @@ module clock_m
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
     type(run_t) :: run              !! intervals and the rule for settling
   contains
-    procedure :: choose_step, advance, finished, settled, store_speed
+    procedure :: choose_step, advance, finished, settled
   end type clock_t
 
 contains
@@ -137,19 +137,5 @@ contains
     yes = self%run%stop_when_settled .and. self%rest_began >= 0.0_wp &
       .and. self%t - self%rest_began >= self%run%rest_time - same_time
   end function settled
-
-  !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
-  pure subroutine store_speed(self, speed, all_there)
-    class(clock_t), intent(inout) :: self
-    real(wp), intent(in) :: speed       !! largest of free blocks (`blocks%speed`) [m/s]
-    logical, intent(in) :: all_there
-      !! there are free blocks, and nothing else moves or is to come, but for lack of room
-
-    if (.not. all_there .or. speed >= self%run%rest_speed) then
-      self%rest_began = -1.0_wp
-    else if (self%rest_began < 0.0_wp) then
-      self%rest_began = self%t
-    end if
-  end subroutine store_speed
 
 end module clock_m

@@ -147,11 +147,10 @@ contains
     end do
     !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      call plane_terms(fluid, grid, k, flow, solid%alpha, terms)
+      call plane_terms(fluid, grid, k, flow, solid%alpha, terms, excess(1))
       do m = 1, n
         call exact_add(terms(:, m), mine(:, m))
       end do
-      excess = max(excess, excess_of_plane(grid, k, flow%fluid_volume, solid%alpha))
     end do
     !$omp end do nowait
     !$omp critical (merge_fluid_sums)
@@ -198,13 +197,15 @@ contains
   !! k. The mass is that of the liquid and the gas in the open part: `flow%rho` of a cut cell is
   !! that of its level, gas that leaves a cut cell under water would have a thousand times its
   !! energy.
-  pure subroutine plane_terms(fluid, grid, k, flow, alpha, terms)
+  pure subroutine plane_terms(fluid, grid, k, flow, alpha, terms, excess)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: k
     type(flow_t), intent(in) :: flow
     real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 3) [m3], [J]
+    real(wp), intent(inout) :: excess
+      !! largest difference of the fluid in a cell from its open volume [V]
     integer :: i, j, first, last, at
     real(wp) :: mass, gas, height, rest   !! [kg], [m3], times gravity, without that along x [m2/s2]
 
@@ -216,6 +217,8 @@ contains
              - fluid%gravity(3)*(grid%centre(k, 3) - grid%origin(3))
       do i = first, last
         associate (liquid => flow%liquid(i, j, k), u => flow%u(i, j, k, :), c => flow%c)
+          excess = max(excess, abs(flow%fluid_volume(i, j, k)/grid%volume &
+                                   - (1.0_wp - alpha(i, j, k))))
           gas = max(0.0_wp, grid%volume*(1.0_wp - alpha(i, j, k)) - liquid)
           mass = fluid%liquid_density*liquid + fluid%gas_density*gas
           height = rest - fluid%gravity(1)*(grid%centre(i, 1) - grid%origin(1))
@@ -243,22 +246,5 @@ contains
     normal = change/h
     depth = 0.5_wp*dot_product(gravity, h*normal)/max(norm(normal), tiny(depth))
   end function below
-
-  !> Largest difference of the fluid that a cell of plane k holds from its open volume [V].
-  pure function excess_of_plane(grid, k, fluid_volume, alpha) result(excess)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: k
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      fluid_volume, alpha
-    real(wp) :: excess
-    integer :: i, j
-
-    excess = 0.0_wp
-    do j = grid%lo(2), grid%hi(2)
-      do i = grid%lo(1), grid%hi(1)
-        excess = max(excess, abs(fluid_volume(i, j, k)/grid%volume - (1.0_wp - alpha(i, j, k))))
-      end do
-    end do
-  end function excess_of_plane
 
 end module diagnostics_m

@@ -74,12 +74,21 @@ contains
     type(clock_t), intent(in) :: clock
     type(quantity_t), intent(in) :: row(:)
     type(blocks_t), intent(in) :: blocks
+    character(*), parameter :: block_columns = '   released  moving  asleep overlap [mm]'
     character(160) :: line
     integer :: released
 
     if (.not. self%shown .or. clock%step == self%last_step) return
     self%last_step = clock%step
-    if (modulo(self%lines, lines_per_header) == 0) call say(header(self%fluid), self)
+    if (modulo(self%lines, lines_per_header) == 0) then
+      if (self%fluid) then
+        call say('    step      t [s]    dt [s]  Courant  div. [1/s]  passes  iterations' &
+                 //block_columns//'      drift  time left', self)
+      else
+        call say('    step      t [s]    dt [s]  substeps  Courant'//block_columns//'  time left', &
+                 self)
+      end if
+    end if
     self%lines = self%lines + 1
     self%last_line = wall_clock()
     released = count(blocks%status == let_go)
@@ -114,20 +123,6 @@ contains
     if (info == 0) flush (output_unit, iostat=info)
     self%shown = info == 0
   end subroutine say
-
-  pure function header(fluid) result(line)
-    logical, intent(in) :: fluid
-    character(:), allocatable :: line
-    character(*), parameter :: clock_columns = '    step      t [s]    dt [s]'
-    character(*), parameter :: block_columns = '   released  moving  asleep overlap [mm]'
-
-    if (fluid) then
-      line = clock_columns//'  Courant  div. [1/s]  passes  iterations'//block_columns &
-        //'      drift  time left'
-    else
-      line = clock_columns//'  substeps  Courant'//block_columns//'  time left'
-    end if
-  end function header
 
   !> Wall time to the end at the mean speed so far, as h:mm:ss.
   function time_left(self, clock) result(text)

@@ -176,16 +176,7 @@ contains
     call file%store('/bodies/planned', 'm', [blocks%planned], shape(blocks%planned))
   end subroutine write_bodies
 
-  !> What may change once or twice in a run, by `once_name`.
-  pure function once_values(blocks) result(values)
-    type(blocks_t), intent(in) :: blocks
-    real(wp) :: values(blocks%n, size(once_name))
-
-    values = reshape([blocks%release_time, blocks%entry_time, blocks%exit_time, blocks%raised, &
-      blocks%record%impact_speed, blocks%record%rest_since], shape(values))
-  end function once_values
-
-  !> Overwrite those that differ from what is in the file, or all.
+  !> What may change once or twice in a run: overwrite what differs from the file, or all.
   subroutine store_once(blocks, every, self)
     type(blocks_t), intent(in) :: blocks
     logical, intent(in) :: every
@@ -193,7 +184,8 @@ contains
     real(wp) :: values(blocks%n, size(once_name))
     integer :: c
 
-    values = once_values(blocks)
+    values = reshape([blocks%release_time, blocks%entry_time, blocks%exit_time, blocks%raised, &
+      blocks%record%impact_speed, blocks%record%rest_since], shape(values))   ! by `once_name`
     if (every) self%once = values
     if (every) self%status = blocks%status
     do c = 1, size(once_name)

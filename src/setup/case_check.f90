@@ -24,11 +24,12 @@ module case_check_m
   use panel_method_m, only: max_surface_panels
   implicit none
   private
-  public :: make_shapes, check_case
+  public :: make_shapes, check_case, check_widths
 
   integer, parameter :: max_reported = 20     !! pairs of overlapping bodies named one by one
   integer, parameter :: max_counted = 1000    !! pairs of overlapping bodies looked for
   real(wp), parameter :: max_samples = 1.0e7_wp   !! points on a shape that measure its overlap
+  real(wp), parameter :: min_cells_wide = 1.0_wp  !! of a free block
 
 contains
 
@@ -328,5 +329,54 @@ contains
       exit
     end do
   end function hindrance
+
+  !> In resolved water every shape of a free block is at least a cell wide; of a family the smallest
+  !! stone counts. One that hides between the faces of a cell has no drag, and what the cells at its
+  !! walls hand back to it (`wall_balance_m`), with arms of a cell, spins and throws it
+  !! (docs/decisions/coupling.md).
+  subroutine check_widths(case, shapes, problems)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`; a faulty one has no volume
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: cure
+    real(wp) :: edge, width(size(shapes))    ! largest of a cell, of the shapes [m]
+    integer :: s, i
+
+    if (case%run%physics /= 'coupled') return
+    if (case%grid%extent_faulty .or. case%grid%cells_faulty) return
+    edge = maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
+    cure = ''
+    width = sqrt(huge(width))   ! of a faulty shape: wide enough, without an overflow below
+    do s = 1, size(shapes)
+      if (shapes(s)%volume > 0.0_wp) width(s) = width_of(shapes(s))
+    end do
+    do s = 1, size(shapes)
+      if (width(s)*(1.0_wp + 1.0e-9_wp) >= min_cells_wide*edge) cycle   ! round-off apart
+      if (shapes(s)%family /= '') then
+        if (s /= minloc(width, 1, shapes%family == shapes(s)%family)) cycle
+      end if
+      if (.not. any(is_called(shapes(s), case%body%shape) .and. .not. case%body%fixed) &
+          .and. all([(count_of_shape(case%drop(i), shapes(s), with_fixed=.false.), &
+                      i=1, size(case%drop))] == 0)) cycle   ! it is not, or does not move freely
+      cure = 'block at least '//brief(min_cells_wide*edge, 3)//' m wide'
+      if (shapes(s)%family /= '') cure = 'mass_min of '//brief(shapes(s)%density &
+        *shapes(s)%volume*(min_cells_wide*edge/width(s))**3, 3)//' kg'
+      call problems%add_message('&shape '//trim(shapes(s)%name)//' is '//brief(width(s), 3) &
+        //' m wide, '//brief(width(s)/edge, 2)//' of a cell of '//brief(edge, 3) &
+        //' m; resolved water needs one cell across a free block: finer &grid cells, physics = ' &
+        //'''light'', or a '//cure, case%shape(s)%line)
+    end do
+  end subroutine check_widths
+
+  !> Width of a shape: the middle one of the three edges of the box around it [m]. Plates thinner
+  !! than a cell fall safely, rods do not.
+  pure function width_of(shape) result(width)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: width
+    real(wp) :: edge(3)
+
+    edge = maxval(shape%point, 2) - minval(shape%point, 2)
+    width = sum(edge) - minval(edge) - maxval(edge)
+  end function width_of
 
 end module case_check_m

@@ -3,9 +3,9 @@ module case_plan_m
   use kinds_m, only: wp, i8
   use vectors_m, only: cube_root, norm
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, contact_input_t, place_t, is_given, &
+  use case_types_m, only: case_t, contact_input_t, is_given, &
     smallest_spacing, has_flow, contact_of, not_resolved
-  use drops_m, only: place_of_block, shape_of_place
+  use rigid_body_m, only: blocks_t, blocks_init
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: file_text
   use contact_law_m, only: contact_law_t, load_t
@@ -46,20 +46,22 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
-    logical :: wet, blocks
+    type(blocks_t) :: blocks   ! all there will be
+    logical :: wet, with_blocks
     integer :: n_points(size(shapes))
     real(wp) :: d_s
 
     wet = has_flow(case%run)
-    blocks = case%run%physics /= 'fluid'
+    with_blocks = case%run%physics /= 'fluid'
+    call blocks_init(case, shapes, blocks)
     call count_contact_features(case, shapes, n_points, d_s)
     call print_run(unit, case)
     call print_grid(unit, case, wet)
     if (bed%there) call print_bed(unit, case, bed)
     if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
-    if (blocks) call print_shapes(unit, case, shapes, n_points)
-    if (blocks) call print_bodies(unit, case, shapes, bed)
-    call print_steps(unit, case, shapes, d_s, wet, blocks)
+    if (with_blocks) call print_shapes(unit, case, shapes, n_points)
+    if (with_blocks) call print_bodies(unit, case, blocks, bed)
+    call print_steps(unit, case, blocks, d_s, wet)
     call print_memory(unit, case, shapes)
     call print_files(unit, case, wet)
   end subroutine print_plan
@@ -121,7 +123,7 @@ contains
 
     low = minval(bed%point, 2)
     high = maxval(bed%point, 2)
-    call entry(unit, 'bed from', file_text(case%bed%folder, trim(case%bed%file))//', ' &
+    call entry(unit, 'bed from', file_text(trim(case%bed%file))//', ' &
                //to_text(bed%n_given)//' facets, ' &
                //'heights from '//place_text(low(3), case%grid%length)//' to ' &
                //place_text(high(3), case%grid%length)//' m')
@@ -172,7 +174,7 @@ contains
     end if
     if (len(case%fluid%initial_state) > 0) then
       call entry(unit, 'initial state', 'from ' &
-                 //file_text(case%fluid%folder, case%fluid%initial_state))
+                 //file_text(case%fluid%initial_state))
     else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
       call entry(unit, 'water level', 'none: no liquid at all')
     end if
@@ -217,7 +219,7 @@ contains
     end do
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') call entry(unit, trim(shapes(s)%name)//' from', &
-        file_text(case%shape(s)%folder, case%shape(s)%file)//', ' &
+        file_text(case%shape(s)%file)//', ' &
         //triple(maxval(shapes(s)%point, 2) - minval(shapes(s)%point, 2))//' m, ' &
         //to_text(size(shapes(s)%facet) - 1)//' facets')   ! its length shows a wrong unit
       if (case%shape(s)%member == 1) call print_family(unit, pack(shapes, shapes%family &
@@ -252,35 +254,28 @@ contains
       //' kg, half of the mass up to '//brief(half(2))//' kg')
   end subroutine print_family
 
-  subroutine print_bodies(unit, case, shapes, bed)
+  subroutine print_bodies(unit, case, blocks, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(in) :: blocks
     type(bed_t), intent(in) :: bed
-    type(place_t) :: place
-    real(wp) :: last   ! release [s]
     real(wp) :: fastest(2)   ! speed and spin [m/s], [rad/s]
-    integer :: n_fixed, n_moved, i, k
+    integer :: n_fixed, n_moved, i
 
     n_fixed = count(case%body%fixed)
     call heading(unit, 'Bodies')
     call entry(unit, 'fixed', to_text(n_fixed))
     call entry(unit, 'free', to_text(size(case%body) - n_fixed))
-    if (sum(case%drop%count) == 0) then
-      call entry(unit, 'dropped', '0')
-    else
-      last = 0.0_wp
-      do i = 1, size(case%drop)
-        do k = 1, case%drop(i)%count
-          place = place_of_block(case%drop(i), k)
-          last = max(last, place%time)
-        end do
-      end do
-      call entry(unit, 'dropped', to_text(sum(case%drop%count))//', the last one at ' &
-                 //brief(last)//' s')
-    end if
+    associate (n => size(case%body))
+      if (blocks%n == n) then
+        call entry(unit, 'dropped', '0')
+      else
+        call entry(unit, 'dropped', to_text(blocks%n - n)//', the last one at ' &
+                   //brief(maxval(blocks%release_time(n + 1:)))//' s')
+      end if
+    end associate
     if (case%begun%n > 0) call entry(unit, 'begin elsewhere', to_text(case%begun%n)//', where ' &
-      //file_text(case%start%folder, case%start%file)//' left them at '//brief(case%begun%time) &
+      //file_text(case%start%file)//' left them at '//brief(case%begun%time) &
       //' s')
     n_moved = 0
     fastest = 0.0_wp
@@ -291,7 +286,7 @@ contains
     end do
     if (n_moved > 0) call entry(unit, 'moved by a table', to_text(n_moved)//', up to ' &
       //brief(fastest(1))//' m/s and '//brief(fastest(2))//' rad/s')
-    if (keeps_its_water(case, bed)) call print_rise(unit, case, shapes)
+    if (keeps_its_water(case, bed)) call print_rise(unit, case, blocks)
   end subroutine print_bodies
 
   !> Does the level rise by the volume of what comes in, over the area of the tank? Not where water
@@ -311,24 +306,18 @@ contains
   end function keeps_its_water
 
   !> The level when all that comes later is under water.
-  subroutine print_rise(unit, case, shapes)
+  subroutine print_rise(unit, case, blocks)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(in) :: blocks
     character(:), allocatable :: text
     real(wp) :: rise   ! [m]
-    integer :: i, k, s
+    integer :: b
 
     rise = 0.0_wp
-    do i = 1, size(case%drop)
-      do k = 1, case%drop(i)%count
-        s = shape_of_place(place_of_block(case%drop(i), k), shapes)
-        if (s > 0) rise = rise + shapes(s)%volume
-      end do
-    end do
-    do i = 1, size(case%body)
-      if (case%body(i)%release_time > 0.0_wp) rise = rise + sum(shapes%volume, shapes%name &
-        == case%body(i)%shape)
+    do b = 1, blocks%n
+      if (b > size(case%body) .or. blocks%release_time(b) > 0.0_wp) rise = rise &
+        + blocks%shapes(blocks%shape(b))%volume
     end do
     if (rise <= 0.0_wp) return
     rise = rise/(case%grid%length(1)*case%grid%length(2))
@@ -339,18 +328,18 @@ contains
   end subroutine print_rise
 
   !> What limits the steps of the fluid and of the bodies.
-  subroutine print_steps(unit, case, shapes, d_s, wet, blocks)
+  subroutine print_steps(unit, case, blocks, d_s, wet)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
-    logical, intent(in) :: wet, blocks
+    logical, intent(in) :: wet
     real(wp) :: h
 
     call heading(unit, 'Time steps')
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
                //count_text(max(1.0_wp, case%run%t_end/case%run%dt))//' steps')
-    call entry(unit, 'time of the run', 'about '//time_text(wet, case, shapes) &
+    call entry(unit, 'time of the run', 'about '//time_text(wet, case, blocks) &
                //' or more on one core')
     h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
@@ -367,24 +356,25 @@ contains
         call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')
       end if
     end if
-    if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes, d_s)
+    if (case%run%physics /= 'fluid' .and. size(blocks%shapes) > 0) call print_body_steps(unit, &
+      case, blocks%shapes, d_s)
   end subroutine print_steps
 
   !> Time for the fewest steps that the run can take with a flow; without one for the substeps of
   !! the blocks that are awake.
-  function time_text(wet, case, shapes) result(text)
+  function time_text(wet, case, blocks) result(text)
     logical, intent(in) :: wet
     type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(in) :: blocks
     character(:), allocatable :: text
     real(wp) :: seconds
 
     if (wet) then
-      seconds = seconds_per_block*real(size(case%body) + sum(case%drop%count), wp) &
+      seconds = seconds_per_block*real(blocks%n, wp) &
         + seconds_per_cell*product(real(case%grid%cells, wp))
       seconds = seconds*case%run%t_end/case%run%dt
     else
-      seconds = seconds_per_substep*block_seconds(case, shapes) &
+      seconds = seconds_per_substep*block_seconds(case, blocks) &
         *substeps_per_contact/case%contact%contact_time
     end if
     if (seconds < 100.0_wp) then
@@ -397,46 +387,27 @@ contains
   end function time_text
 
   !> Times for which the blocks are awake, all together [s].
-  function block_seconds(case, shapes) result(seconds)
+  pure function block_seconds(case, blocks) result(seconds)
     type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(in) :: blocks
     real(wp) :: seconds
-    type(place_t) :: place
-    real(wp) :: time, last, sum_times   ! a release, the last one, all together [s]
-    integer :: i, k, n
+    real(wp) :: awake, g
+    integer :: b, n
 
+    g = norm(case%fluid%gravity)
+    n = size(case%body)
     seconds = 0.0_wp
-    last = 0.0_wp
-    sum_times = 0.0_wp
-    n = 0
-    do i = 1, size(case%drop)
-      do k = 1, case%drop(i)%count
-        place = place_of_block(case%drop(i), k)
-        seconds = seconds + awake(shape_of_place(place, shapes), place%time)
-        time = min(place%time, case%run%t_end)
-        last = max(last, time)
-        sum_times = sum_times + time
-        n = n + 1
-      end do
+    do b = 1, blocks%n
+      if (b <= n .and. blocks%fixed(b)) cycle
+      awake = max(case%run%t_end - blocks%release_time(b), 0.0_wp)
+      if (case%contact%sleep .and. g > 0.0_wp) awake = min(awake, &
+        time_awake*sqrt(cube_root(blocks%shapes(blocks%shape(b))%volume)/g))
+      seconds = seconds + awake
     end do
-    do i = 1, size(case%body)
-      if (case%body(i)%fixed) cycle
-      seconds = seconds + awake(findloc(shapes%name, case%body(i)%shape, 1), &
-                                case%body(i)%release_time)
-    end do
-    if (case%contact%sleep) seconds = seconds + share_shaken*(n*last - sum_times)
-  contains
-    !> Time for which a block of shape s is awake that is let go at a time.
-    pure real(wp) function awake(s, time)
-      integer, intent(in) :: s
-      real(wp), intent(in) :: time
-
-      awake = max(case%run%t_end - time, 0.0_wp)
-      associate (g => norm(case%fluid%gravity))
-        if (case%contact%sleep .and. s > 0 .and. g > 0.0_wp) awake = min(awake, &
-          time_awake*sqrt(cube_root(shapes(s)%volume)/g))
-      end associate
-    end function awake
+    if (.not. case%contact%sleep) return
+    associate (time => min(blocks%release_time(n + 1:), case%run%t_end))   ! of the drops
+      if (size(time) > 0) seconds = seconds + share_shaken*sum(maxval(time) - time)
+    end associate
   end function block_seconds
 
   !> Limits of the body steps, and how far the lightest shape gives way.

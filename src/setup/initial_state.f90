@@ -38,7 +38,7 @@ contains
     logical :: liquid, velocity
 
     if (.not. (is_named(case%fluid) .and. has_flow(case%run))) return
-    call file%open(found_file(case%fluid%folder, case%fluid%initial_state), .false., .false.)
+    call file%open(found_file(case%fluid%initial_state), .false., .false.)
     liquid = file%has(liquid_name)
     velocity = file%has(velocity_name)
     if (file%info /= 0) then
@@ -139,7 +139,7 @@ contains
     integer :: extent(3)
 
     if (.not. is_named(fluid)) return
-    call file%open(found_file(fluid%folder, fluid%initial_state), .false., .false.)
+    call file%open(found_file(fluid%initial_state), .false., .false.)
     if (file%has(liquid_name)) then
       extent = grid%hi - grid%lo + 1
       allocate (part(product(extent)), source=0.0_wp)
@@ -166,7 +166,7 @@ contains
     integer :: d, extent(3)
 
     if (.not. is_named(fluid)) return
-    call file%open(found_file(fluid%folder, fluid%initial_state), .false., .false.)
+    call file%open(found_file(fluid%initial_state), .false., .false.)
     if (file%has(velocity_name)) then
       extent = grid%hi - grid%lo + 1
       allocate (part(3*product(extent)), source=0.0_wp)

@@ -67,7 +67,7 @@ contains
     integer, allocatable :: extent(:), fixed(:)
     integer :: row
 
-    call file%open(found_file(case%start%folder, case%start%file), .false., .false.)
+    call file%open(found_file(case%start%file), .false., .false.)
     if (file%info == 0) then
       if (.not. file%has('/bodies/position')) then
         call report(case, 'holds no blocks; must be the run.h5 of a run with blocks', problems)

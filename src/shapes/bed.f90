@@ -63,7 +63,7 @@ contains
     integer :: n_before
 
     if (len_trim(case%bed%file) == 0 .or. case%bed%faulty) return
-    call read_bed_file(found_file(case%bed%folder, trim(case%bed%file)), case%bed%kind, form, &
+    call read_bed_file(found_file(trim(case%bed%file)), case%bed%kind, form, &
       message)
     if (len(message) > 0) then
       call report(message)

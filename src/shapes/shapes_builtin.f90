@@ -139,7 +139,7 @@ contains
     real(wp) :: extent
     integer :: m
 
-    call read_shape_file(found_file(input%folder, input%file), shape%point, shape%tet, message)
+    call read_shape_file(found_file(input%file), shape%point, shape%tet, message)
     if (len(message) == 0) call check_mesh(shape%point, shape%tet, message)
     if (len(message) > 0) then
       message = 'file = '//quoted_text(input%file)//': '//message

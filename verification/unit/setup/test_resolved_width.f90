@@ -4,8 +4,7 @@ module test_resolved_width_m
   use errors_m, only: problems_t
   use case_types_m, only: case_t
   use case_input_m, only: read_case
-  use case_check_m, only: make_shapes
-  use resolved_width_m, only: check_widths
+  use case_check_m, only: make_shapes, check_widths
   use tet_mesh_m, only: shape_t
   implicit none
   private
