@@ -15,7 +15,8 @@ module simulation_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: lowering, blocks_init, turn_with_fluid, kinetic_energy, potential_energy
+  use rigid_body_m, only: lowering, kinetic_energy, potential_energy
+  use case_blocks_m, only: blocks_init, turn_with_fluid
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use contacts_m, only: contacts_init

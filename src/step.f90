@@ -44,7 +44,7 @@ module step_m
   use contacts_m, only: contact_report_t, move_blocks
   use block_record_m, only: update_record
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
+  use deep_overlaps_m, only: ask_for_deep, store_points, warn_of_overlaps
   use release_m, only: release_due_blocks, let_go_lowered, take_out, next_release, nothing_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
@@ -146,7 +146,7 @@ contains
 
     if (report%overlap_known) return
     call tic(sim%timer_blocks)
-    call ask_for_all(sim%deep)
+    sim%deep%asked = .true.
     call max_overlap(sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
     call toc(sim%timer_blocks)
     report%overlap_known = .true.

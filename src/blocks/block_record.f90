@@ -7,7 +7,7 @@ module block_record_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: update_record, begin_row
+  public :: update_record
 
 contains
 
@@ -51,12 +51,5 @@ contains
       end do
     end associate
   end subroutine update_record
-
-  !> A due row has been written: the next one has the hardest contact after it.
-  pure subroutine begin_row(blocks)
-    type(blocks_t), intent(inout) :: blocks
-
-    blocks%record%hardest = 0.0_wp
-  end subroutine begin_row
 
 end module block_record_m

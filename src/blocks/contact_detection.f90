@@ -32,7 +32,7 @@ module contact_detection_m
     type(contact_surface_t) :: surface
     real(wp), allocatable :: bounding_radius(:)  !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
-    real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
+    real(wp) :: unlisted_gap = 0.0_wp            !! way of bodies that are not near to touch [m]
     type(counterparts_t) :: counterparts
     type(acting_t) :: acting                     !! bodies that are awake or touch
     type(contact_points_t) :: points
@@ -63,12 +63,12 @@ contains
       call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)
       self%bounding_radius = self%surface%bounding_radius
       self%smallest = self%surface%smallest
-      self%clear = self%surface%clear
+      self%unlisted_gap = self%surface%unlisted_gap
     else
       call contact_spheres_init(input%courant_max, blocks, self%spheres)
       self%bounding_radius = self%spheres%bounding_radius
       self%smallest = self%spheres%smallest
-      self%clear = self%spheres%clear
+      self%unlisted_gap = self%spheres%unlisted_gap
     end if
     call counterparts_init(blocks, self%counterparts)
     allocate (self%acting%body(blocks%n), source=0)

@@ -43,6 +43,7 @@ contains
     type(contact_detection_t), intent(inout) :: detected
     type(displacements_t), intent(inout) :: before   !! work: displacements of the substep before
     type(displacements_t), intent(inout) :: displacements
+    real(wp) :: xi(3)
     integer :: g, m, t
 
     associate (points => detected%points, groups => detected%groups, old => before, &
@@ -70,21 +71,12 @@ contains
         end do
         if (m > old%n) cycle
         groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%id(m) /= new%id(g)
-        if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
+        if (groups%new(g)) cycle
+        xi = old%xi(:, m) - dot_product(old%xi(:, m), groups%normal(:, g))*groups%normal(:, g)
+        if (norm(xi) > 0.0_wp) new%xi(:, g) = xi*(norm(old%xi(:, m))/norm(xi))   ! as long as it was
       end do
     end associate
   end subroutine match_displacements
-
-  !> The vector xi turned into the plane normal to n, its length kept.
-  pure function turned_into_plane(xi, n) result(turned)
-    real(wp), intent(in) :: xi(3), n(3)
-    real(wp) :: turned(3)
-    real(wp) :: length
-
-    turned = xi - dot_product(xi, n)*n
-    length = norm(turned)
-    if (length > 0.0_wp) turned = turned*(norm(xi)/length)
-  end function turned_into_plane
 
   !> Let the displacements follow the present tangential velocities for a time dt.
   pure subroutine integrate_displacements(dt, detected, displacements)

@@ -46,13 +46,13 @@ module contact_law_m
   abstract interface
     !> Constant k_n of a contact point of weight one: the same whatever else touches, so that the
     !! elastic energy is a function of position only.
-    elemental function normal_constant_i(law, reduced_mass, load, give) result(k)
+    elemental function normal_constant_i(law, reduced_mass, load, rest_overlap) result(k)
       import :: contact_law_t, load_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]
       type(load_t), intent(in) :: load       !! on the contact point
-      real(wp), intent(in) :: give           !! overlap that it may make at rest, > 0 [m]
+      real(wp), intent(in) :: rest_overlap           !! overlap that it may make at rest, > 0 [m]
       real(wp) :: k                          !! [N/m^gamma_n]
     end function normal_constant_i
 

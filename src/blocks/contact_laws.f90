@@ -1,12 +1,19 @@
-!> The contact laws by their names: a new one is a file and a line here.
+!> The contact laws by their names (a new one is a file and a line here), and what their contact
+!! points bear at rest.
 module contact_laws_m
+  use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t
+  use mass_properties_m, only: surface_area
+  use tet_mesh_m, only: shape_t
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t
   use law_restitution_m, only: law_restitution
   use law_constants_m, only: law_constants
   implicit none
   private
-  public :: choose_law
+  public :: choose_law, load_of, hard_depth, depth_at_rest, rest_overlap_share
+
+  real(wp), parameter :: rest_overlap_share = 0.01_wp
+    !! overlap at rest over the size of a block, at most
 
 contains
 
@@ -23,5 +30,56 @@ contains
     law%friction = input%friction
     law%wall_friction = input%wall_friction
   end subroutine choose_law
+
+  !> Load of a contact point that carries a block.
+  elemental function load_of(mass, gravity) result(load)
+    real(wp), intent(in) :: mass      !! of the block [kg]
+    real(wp), intent(in) :: gravity   !! >= 0 [m/s2]
+    type(load_t) :: load
+
+    load%mass = mass
+    load%weight = mass*gravity
+  end function load_of
+
+  !> Depth at which contact points of a block harden: a quarter of its mean thickness, twice the
+  !! volume over the surface [m].
+  pure function hard_depth(shape) result(hard)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: hard
+
+    hard = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
+  end function hard_depth
+
+  !> Depth at which the spring of a contact point of weight one holds a force, by bisection [m].
+  pure function depth_at_rest(law, k, hard, force) result(depth)
+    class(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: k       !! of the law, `normal_constant` [N/m^gamma]
+    real(wp), intent(in) :: hard    !! depth d_h where contacts harden, > 0 [m]
+    real(wp), intent(in) :: force   !! >= 0 [N]
+    real(wp) :: depth
+    integer, parameter :: halvings = 60
+    type(stiffness_t) :: elastic
+    real(wp) :: low, high
+    integer :: i
+
+    depth = 0.0_wp
+    if (.not. force > 0.0_wp) return
+    low = 0.0_wp
+    high = hard
+    do   ! ends: the force grows at least as the depth does
+      call law%normal_stiffness(k, 1.0_wp, high, hard, elastic)
+      if (elastic%force >= force) exit
+      high = 2*high
+    end do
+    do i = 1, halvings
+      depth = 0.5_wp*(low + high)
+      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      if (elastic%force < force) then
+        low = depth
+      else
+        high = depth
+      end if
+    end do
+  end function depth_at_rest
 
 end module contact_laws_m

@@ -111,7 +111,7 @@ contains
       groups%normal(:, g) = points%item(t)%normal
       groups%arm_a(:, g) = points%item(t)%arm_a
       groups%arm_b(:, g) = points%item(t)%arm_b
-      if (last > t) call take_mean(points%item(t:last), groups%normal(:, g), &
+      if (last > t) call average(points%item(t:last), groups%normal(:, g), &
         groups%arm_a(:, g), groups%arm_b(:, g))
       t = last + 1
     end do
@@ -119,7 +119,7 @@ contains
   end subroutine form_groups
 
   !> Mean normal and point of some contact points, weighted by overlap.
-  pure subroutine take_mean(point, normal, arm_a, arm_b)
+  pure subroutine average(point, normal, arm_a, arm_b)
     type(contact_point_t), intent(in) :: point(:)
     real(wp), intent(out) :: normal(3), arm_a(3), arm_b(3)   !! [-], [m]
     real(wp) :: w, total
@@ -142,6 +142,6 @@ contains
     else
       normal = point(1)%normal
     end if
-  end subroutine take_mean
+  end subroutine average
 
 end module contact_points_m

@@ -116,7 +116,7 @@ contains
     load = 0.0_wp
     steep = 0.0_wp
     of%k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), counterparts%load, &
-      min(counterparts%give(a), counterparts%give(b)))
+      min(counterparts%rest_overlap(a), counterparts%rest_overlap(b)))
     hard = min(counterparts%hard(a), counterparts%hard(b))
     do t = first, last
       associate (point => points%item(t))

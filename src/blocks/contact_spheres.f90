@@ -37,8 +37,8 @@ module contact_spheres_m
 
   type :: contact_spheres_t
     real(wp) :: skin = 0.0_wp                  !! pairs nearer than this are listed [m]
-    real(wp) :: clear = 0.0_wp                 !! way of pairs that are not listed to touch [m]
-    real(wp) :: free_way = 0.0_wp              !! by which bodies may move before the next list [m]
+    real(wp) :: unlisted_gap = 0.0_wp            !! way of pairs that are not listed to touch [m]
+    real(wp) :: valid_way = 0.0_wp              !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
     real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
@@ -90,9 +90,9 @@ contains
     end do
     allocate (self%slot_of(s), source=0)
     if (blocks%n == 0) return
-    self%free_way = share*self%smallest
-    self%clear = courant_max*self%smallest
-    self%skin = 2*self%free_way + self%clear
+    self%valid_way = share*self%smallest
+    self%unlisted_gap = courant_max*self%smallest
+    self%skin = 2*self%valid_way + self%unlisted_gap
   end subroutine contact_spheres_init
 
   !> All contact points at the present poses, but for those between bodies that are still, and those
@@ -169,7 +169,7 @@ contains
       dx = blocks%x(:, b) - self%x(:, b)
       dq = blocks%q(:, b) - self%q(:, b)
       ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-      if (norm(dx) + 2*self%bounding_radius(b)*norm(dq) > self%free_way) return
+      if (norm(dx) + 2*self%bounding_radius(b)*norm(dq) > self%valid_way) return
     end do
     yes = .false.
   end function moved_too_far

@@ -47,7 +47,7 @@ module contact_surface_m
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
     real(wp) :: listed_skin = 0.0_wp             !! of the present list [m]
-    real(wp) :: clear = 0.0_wp                   !! way of pairs that are not in it to touch [m]
+    real(wp) :: unlisted_gap = 0.0_wp            !! way of pairs that are not in it to touch [m]
     type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
     type(pair_t), allocatable :: pairs(:)        !! (near%n)
     type(pair_t), allocatable :: with_bed(:)     !! (bodies) each with the bed
@@ -58,9 +58,9 @@ module contact_surface_m
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: q(:, :)             !! (4, bodies) the attitudes of that
     !> Pairs that can touch: not both still, not both fixed.
-    logical :: live_listed = .false.
-    integer :: n_live = 0
-    integer, allocatable :: live(:)              !! (n_live) numbers in `near`, rising
+    logical :: moving_listed = .false.
+    integer :: n_moving = 0
+    integer, allocatable :: moving(:)            !! (n_moving) numbers in `near`, rising
     integer, allocatable :: state(:)             !! (bodies) of which they are, see `state_of`
   end type contact_surface_t
 
@@ -107,7 +107,7 @@ contains
     real(wp), intent(in) :: way     !! [m]
     type(contact_surface_t), intent(inout) :: self
 
-    self%clear = way
+    self%unlisted_gap = way
     self%wide_skin = max(wide_share*maxval(self%bounding_radius), 2*way)
   end subroutine cover_way
 
@@ -129,7 +129,7 @@ contains
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
-    call renew_live(blocks, self)
+    call renew_moving(blocks, self)
     points%n = 0
     p = 1
     do a = 1, blocks%n
@@ -142,40 +142,49 @@ contains
           call add_wall_points(walls, blocks, a, w, gap, self, points)
         end do
       end if
-      do while (p <= self%n_live)
-        if (self%near%a(self%live(p)) /= a) exit
-        call add_pair_points(blocks, ahead, self%live(p), self, points)
+      do while (p <= self%n_moving)
+        if (self%near%a(self%moving(p)) /= a) exit
+        call add_pair_points(blocks, ahead, self%moving(p), self, points)
         p = p + 1
       end do
     end do
   end subroutine find_surface_points
 
-  !> Renew the list of pairs where it no longer holds.
+  !> Renew the list of pairs where one may have come near that is not in it.
   subroutine renew_pairs(walls, blocks, self)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(inout) :: self
+    logical :: holds
+    integer :: b
 
-    if (pairs_may_be_missing(self, blocks)) call list_pairs(walls, blocks, self)
+    holds = self%listed
+    do b = 1, merge(blocks%n, 0, holds)
+      holds = blocks%present(b) .eqv. self%present(b)
+      if (holds .and. blocks%present(b)) holds = .not. distance(blocks%x(:, b), self%x(:, b)) &
+        > 0.5_wp*(self%listed_skin - self%unlisted_gap)
+      if (.not. holds) exit
+    end do
+    if (.not. holds) call list_pairs(walls, blocks, self)
   end subroutine renew_pairs
 
   !> List the pairs that can touch anew where the list no longer holds.
-  pure subroutine renew_live(blocks, self)
+  pure subroutine renew_moving(blocks, self)
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(inout) :: self
     integer :: p
 
-    if (self%live_listed .and. all(self%state == state_of(blocks%still, blocks%fixed))) return
+    if (self%moving_listed .and. all(self%state == state_of(blocks%still, blocks%fixed))) return
     self%state = state_of(blocks%still, blocks%fixed)
-    call ensure_capacity(self%near%n, self%live)
-    self%n_live = 0
+    call ensure_capacity(self%near%n, self%moving)
+    self%n_moving = 0
     do p = 1, self%near%n
       if (iand(self%state(self%near%a(p)), self%state(self%near%b(p))) /= 0) cycle
-      self%n_live = self%n_live + 1
-      self%live(self%n_live) = p
+      self%n_moving = self%n_moving + 1
+      self%moving(self%n_moving) = p
     end do
-    self%live_listed = .true.
-  end subroutine renew_live
+    self%moving_listed = .true.
+  end subroutine renew_moving
 
   !> Bit 0: still, bit 1: fixed. Two bodies with a bit in common cannot touch.
   elemental integer function state_of(still, fixed)
@@ -183,23 +192,6 @@ contains
 
     state_of = merge(1, 0, still) + merge(2, 0, fixed)
   end function state_of
-
-  !> Whether a pair may have come near that is not in the list.
-  pure function pairs_may_be_missing(self, blocks) result(yes)
-    type(contact_surface_t), intent(in) :: self
-    type(blocks_t), intent(in) :: blocks
-    logical :: yes
-    integer :: b
-
-    yes = .true.
-    if (.not. self%listed) return
-    do b = 1, blocks%n
-      if (blocks%present(b) .neqv. self%present(b)) return
-      if (.not. blocks%present(b)) cycle
-      if (distance(blocks%x(:, b), self%x(:, b)) > 0.5_wp*(self%listed_skin - self%clear)) return
-    end do
-    yes = .false.
-  end function pairs_may_be_missing
 
   !> List the pairs of bodies whose bounding spheres may meet before a body has moved far; pairs
   !! that were listed before keep their features.
@@ -237,7 +229,7 @@ contains
       end if
     end do
     self%listed = .true.
-    self%live_listed = .false.
+    self%moving_listed = .false.
     self%listed_skin = self%wide_skin
     self%present = blocks%present
     self%x = blocks%x
@@ -394,12 +386,16 @@ contains
 
   !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
   !! (the host).
+  !!
+  !! With a margin, a point inside a flat face of the guest may come only to a surface that the face
+  !! looks at: else, level with the edge of a face ahead, it would hold a body that slides over it.
   subroutine add_vertex_points(guest_is_a, now, guest, host, pair, points)
     logical, intent(in) :: guest_is_a
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: guest, host
     type(pair_t), intent(in) :: pair
     type(contact_points_t), intent(inout) :: points
+    real(wp), parameter :: max_cosine = -0.2_wp   !! of a face and the surface that it looks at [-]
     type(view_t) :: view                      ! of the guest, host axes
     type(contact_point_t) :: point
     real(wp) :: turn_host(3, 3), place(3), apart, outward(3), arm(3)
@@ -432,7 +428,9 @@ contains
       end associate
       point%depth = guest%ball - apart
       if (point%depth <= -now%gap) cycle
-      if (now%margin > 0.0_wp .and. .not. may_face(guest, i, view, outward)) cycle
+      if (now%margin > 0.0_wp .and. guest%ball <= 0.0_wp .and. i > guest%n_corners) then
+        if (.not. dot_product(matmul(view%turn, guest%facing(:, i)), outward) < max_cosine) cycle
+      end if
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
       outward = matmul(turn_host, outward)
       point%weight = guest%weight(i)
@@ -451,21 +449,6 @@ contains
       call add_point(point, points)
     end do
   end subroutine add_vertex_points
-
-  !> May a vertex of the guest come to a surface of that outward direction? A point inside a flat
-  !! face only to one that the face looks at: else, level with the edge of a face ahead, it would
-  !! hold a body that slides over it.
-  pure function may_face(guest, i, view, outward) result(yes)
-    type(surface_t), intent(in) :: guest
-    integer, intent(in) :: i             !! number of the vertex
-    type(view_t), intent(in) :: view     !! of the guest, host axes
-    real(wp), intent(in) :: outward(3)   !! of the host, its axes [-]
-    logical :: yes
-    real(wp), parameter :: max_cosine = -0.2_wp   !! of both directions [-]
-
-    yes = guest%ball > 0.0_wp .or. i <= guest%n_corners
-    if (.not. yes) yes = dot_product(matmul(view%turn, guest%facing(:, i)), outward) < max_cosine
-  end function may_face
 
   !> Contact points of the chosen pairs of edges that cross.
   subroutine add_edge_points(now, surface_a, surface_b, pair, points)

@@ -5,7 +5,7 @@ module contacts_m
   use rigid_body_m, only: blocks_t, begin_step, hold_sleepers, look_ahead, follow_motions, &
     fastest_point
   use walls_m, only: walls_t
-  use sleep_m, only: update_stillness, store_poses, store_quiet, all_still
+  use sleep_m, only: update_stillness, store_quiet, all_still
   use counterparts_m, only: update_counterparts
   use contact_forces_m, only: contact_report_t
   use contact_solver_m, only: contact_solver_t, count_counterparts
@@ -91,7 +91,8 @@ contains
     contacts%met%n = 0
     call update_counterparts(walls, gravity, blocks, contacts%detected%counterparts)
     if (.not. contacts%sleep%active) return
-    call store_poses(blocks, contacts%sleep)
+    contacts%sleep%x = blocks%x
+    contacts%sleep%q = blocks%q
     call update_stillness(blocks, changed)
     if (changed) call restore_contacts(blocks, contacts)
   end subroutine begin

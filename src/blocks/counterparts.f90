@@ -6,7 +6,7 @@ module counterparts_m
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
   use contact_law_m, only: load_t
-  use contact_load_m, only: load_of, hard_depth, give_share
+  use contact_laws_m, only: load_of, hard_depth, rest_overlap_share
   implicit none
   private
   public :: counterparts_t, inertia_t, motion_t, wrench_t
@@ -20,7 +20,7 @@ module counterparts_m
     real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, counterparts) [m/s], [rad/s]
     real(wp), allocatable :: hard(:)
       !! (counterparts) depth where contacts harden [m]
-    real(wp), allocatable :: give(:)                   !! (counterparts) largest overlap at rest [m]
+    real(wp), allocatable :: rest_overlap(:)           !! (counterparts) largest overlap at rest [m]
     type(load_t) :: load
       !! of a contact point under the heaviest free body
     real(wp), allocatable :: inverse_mass(:)
@@ -57,11 +57,11 @@ contains
 
     n = blocks%n
     allocate (counterparts%hard(bed_counterpart:n), source=huge(1.0_wp))
-    allocate (counterparts%give(bed_counterpart:n), source=huge(1.0_wp))
+    allocate (counterparts%rest_overlap(bed_counterpart:n), source=huge(1.0_wp))
     do b = 1, n
       associate (shape => blocks%shapes(blocks%shape(b)))
         counterparts%hard(b) = hard_depth(shape)
-        counterparts%give(b) = give_share*shape%smallest_edge
+        counterparts%rest_overlap(b) = rest_overlap_share*shape%smallest_edge
       end associate
     end do
     allocate (counterparts%v(3, bed_counterpart:n), counterparts%omega(3, bed_counterpart:n), &

@@ -9,8 +9,7 @@ module deep_overlaps_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_points
-  public :: ask_for_all, ask_for_deep
+  public :: deep_overlaps_t, deep_overlaps_init, store_overlap, store_points, ask_for_deep
   public :: size_of_pair, warn_of_overlaps, overlap_fault, reported_share
 
   real(wp), parameter :: reported_share = 0.05_wp   !! overlap over size to report a body
@@ -42,13 +41,6 @@ contains
     deep%size = [(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)]
   end subroutine deep_overlaps_init
 
-  !> Ask for the overlaps of all bodies.
-  pure subroutine ask_for_all(deep)
-    type(deep_overlaps_t), intent(inout) :: deep
-
-    deep%asked = .true.
-  end subroutine ask_for_all
-
   !> Ask for the overlaps of bodies that move with a deep contact, and of their counterparts.
   pure subroutine ask_for_deep(points, blocks, deep)
     type(contact_points_t), intent(in) :: points
@@ -70,14 +62,6 @@ contains
     end do
   end subroutine ask_for_deep
 
-  !> Forget the overlaps of the step before.
-  pure subroutine forget_overlaps(deep)
-    type(deep_overlaps_t), intent(inout) :: deep
-
-    deep%depth = 0.0_wp
-    deep%share = 0.0_wp
-  end subroutine forget_overlaps
-
   !> Size of the smaller of a body and its counterpart; walls and the bed have none [m].
   pure function size_of_pair(a, b, deep) result(size)
     integer, intent(in) :: a, b   !! body; body, or below 1: wall or bed
@@ -94,24 +78,18 @@ contains
     real(wp), intent(in) :: depth       !! [m]
     type(deep_overlaps_t), intent(inout) :: deep
     real(wp) :: share
+    integer :: body(2), i
 
     share = depth/size_of_pair(a, b, deep)
     if (.not. share > reported_share) return
-    call keep_deepest(a, b, depth, share, deep)
-    if (b > 0) call keep_deepest(b, a, depth, share, deep)
+    body = [a, b]
+    do i = 1, merge(2, 1, b > 0)
+      if (share <= deep%share(body(i))) cycle
+      deep%share(body(i)) = share
+      deep%depth(body(i)) = depth
+      deep%counterpart(body(i)) = body(3 - i)
+    end do
   end subroutine store_overlap
-
-  !> Note an overlap with one body, where it is its deepest.
-  pure subroutine keep_deepest(body, counterpart, depth, share, deep)
-    integer, intent(in) :: body, counterpart
-    real(wp), intent(in) :: depth, share   !! [m], of the size of the smaller [-]
-    type(deep_overlaps_t), intent(inout) :: deep
-
-    if (share <= deep%share(body)) return
-    deep%share(body) = share
-    deep%depth(body) = depth
-    deep%counterpart(body) = counterpart
-  end subroutine keep_deepest
 
   !> Note the overlaps of contact points: of contact spheres, where the true shapes overlap at rest.
   pure subroutine store_points(points, deep)
@@ -119,7 +97,8 @@ contains
     type(deep_overlaps_t), intent(inout) :: deep
     integer :: t
 
-    call forget_overlaps(deep)
+    deep%depth = 0.0_wp
+    deep%share = 0.0_wp
     do t = 1, points%n
       call store_overlap(points%item(t)%a, points%item(t)%b, points%item(t)%depth, deep)
     end do

@@ -33,14 +33,14 @@ contains
     law%eta_t = input%eta_t
   end function law_constants
 
-  elemental function normal_constant(law, reduced_mass, load, give) result(k)
+  elemental function normal_constant(law, reduced_mass, load, rest_overlap) result(k)
     class(law_constants_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass
     type(load_t), intent(in) :: load
-    real(wp), intent(in) :: give
+    real(wp), intent(in) :: rest_overlap
     real(wp) :: k
 
-    associate (unused => reduced_mass, unused_too => load, unused_as_well => give)
+    associate (unused => reduced_mass, unused_too => load, unused_as_well => rest_overlap)
     end associate
     k = law%k_n
   end function normal_constant

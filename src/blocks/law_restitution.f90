@@ -96,17 +96,17 @@ contains
   end function damping_ratio_of
 
   !> Spring on which an impact takes the contact time; stiffer where it has to carry a load that
-  !! would press it in by more than `give`, but no stiffer than that of two blocks as heavy as the
-  !! load.
-  elemental function normal_constant(law, reduced_mass, load, give) result(k)
+  !! would press it in by more than `rest_overlap`, but no stiffer than that of two blocks as heavy
+  !! as the load.
+  elemental function normal_constant(law, reduced_mass, load, rest_overlap) result(k)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass
     type(load_t), intent(in) :: load
-    real(wp), intent(in) :: give
+    real(wp), intent(in) :: rest_overlap
     real(wp) :: k
 
     k = max(reduced_mass*law%frequency**2, &
-            min(0.5_wp*load%mass*law%frequency**2, load%weight/give))
+            min(0.5_wp*load%mass*law%frequency**2, load%weight/rest_overlap))
   end function normal_constant
 
   elemental function tangential_constant(law, k_n, weight) result(k)

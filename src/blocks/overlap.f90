@@ -14,8 +14,7 @@ module overlap_m
   use surface_search_m, only: found_t, gather_edges, search_surface
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
-  use deep_overlaps_m, only: deep_overlaps_t, forget_overlaps, store_overlap, size_of_pair, &
-    reported_share
+  use deep_overlaps_m, only: deep_overlaps_t, store_overlap, size_of_pair, reported_share
   implicit none
   private
   public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place, exclude
@@ -150,7 +149,8 @@ contains
     integer :: a, b, p
 
     depth = 0.0_wp
-    call forget_overlaps(deep)
+    deep%depth = 0.0_wp
+    deep%share = 0.0_wp
     if (.not. any(deep%asked)) return
     asked = deep%asked .and. blocks%present
     do a = 1, blocks%n

@@ -18,7 +18,7 @@ module sleep_m
   use displacements_m, only: displacements_t, reserve_displacements
   implicit none
   private
-  public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
+  public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory
   public :: store_quiet, may_sleep
   public :: balanced, rest_tolerance, wake_tolerance, put_to_sleep, wake, all_still
 
@@ -107,15 +107,6 @@ contains
       torque(:, b) = torque(:, b) + displacements%torque_b(:, i)
     end do
   end subroutine sum_memory
-
-  !> Note where the blocks are when a fluid step begins.
-  pure subroutine store_poses(blocks, sleep)
-    type(blocks_t), intent(in) :: blocks
-    type(sleep_t), intent(inout) :: sleep
-
-    sleep%x = blocks%x
-    sleep%q = blocks%q
-  end subroutine store_poses
 
   !> Count the time for which each block has been slow, by a fluid step.
   !!

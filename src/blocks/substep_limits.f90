@@ -60,7 +60,7 @@ contains
         if (.not. speed <= fastest(2)) fastest(2) = speed
         if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
         if (.not. speed <= near) then
-          if (near_wall(walls, blocks%x(:, b), radius(b) + detected%clear)) near = speed
+          if (near_wall(walls, blocks%x(:, b), radius(b) + detected%unlisted_gap)) near = speed
         end if
       end do
     end associate
@@ -68,7 +68,7 @@ contains
       limit = limits%courant_max*detected%smallest/near
     end if
     speed = sum(fastest)
-    if (.not. speed*limit <= detected%clear) limit = detected%clear/speed
+    if (.not. speed*limit <= detected%unlisted_gap) limit = detected%unlisted_gap/speed
   end function substep_limit
 
   !> Highest relative speed of any two points of pairs of bodies that are near now [m/s]. The list
@@ -86,7 +86,7 @@ contains
       associate (a => near%a(p), b => near%b(p), radius => detected%bounding_radius)
         if (blocks%still(a) .and. blocks%still(b)) cycle
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
-            > radius(a) + radius(b) + detected%clear) cycle
+            > radius(a) + radius(b) + detected%unlisted_gap) cycle
         speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*radius(a) &
           + norm(blocks%omega(:, b))*radius(b) + haste(blocks, a, radius(a)) &
           + haste(blocks, b, radius(b))

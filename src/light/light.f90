@@ -20,7 +20,7 @@ module light_m
   use boundary_kinds_m, only: side_code, gives_pressure
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_moments_below
-  use rigid_body_m, only: blocks_t, own_mass, drift, turn_to_attitude
+  use rigid_body_m, only: blocks_t, own_mass, drift, angular_velocity
   use bed_m, only: bed_t
   use bed_measure_m, only: bed_volume
   use panels_m, only: panels_t, surface_panels, split_panels
@@ -213,7 +213,11 @@ contains
     end do
     blocks%x = light%x
     blocks%q = light%q
-    call turn_to_attitude(blocks)
+    do b = 1, blocks%n
+      if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle
+      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
+        blocks%inverse_inertia(:, :, b))
+    end do
   end subroutine enter_water
 
   !> The forces of the water in the step that ends, with what the water that the blocks carry takes:

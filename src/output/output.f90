@@ -10,7 +10,6 @@ module output_m
   use command_line_m, only: options_t
   use case_types_m, only: case_t, fluid_t, not_resolved
   use bed_m, only: bed_t
-  use block_record_m, only: begin_row
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use result_file_m, only: result_file_t
@@ -286,7 +285,7 @@ contains
     if (row_wanted) then
       call output%run_file%append(state%clock%rows%n, state)
       call state%clock%rows%done(state%clock%t)
-      call begin_row(state%blocks)
+      state%blocks%record%hardest = 0.0_wp
       output%row_step = state%clock%step
     end if
     if (frame_wanted) then
@@ -368,7 +367,7 @@ contains
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
       if (row_wanted .and. state%clock%rows%due(state%clock%t)) then
         call state%clock%rows%done(state%clock%t)
-        call begin_row(state%blocks)
+        state%blocks%record%hardest = 0.0_wp
       end if
       if (frame_wanted .and. state%clock%frames%due(state%clock%t)) then
         call state%clock%frames%done(state%clock%t)

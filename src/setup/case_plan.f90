@@ -9,8 +9,7 @@ module case_plan_m
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: file_text
   use contact_law_m, only: contact_law_t, load_t
-  use contact_laws_m, only: choose_law
-  use contact_load_m, only: load_of, give_share
+  use contact_laws_m, only: choose_law, load_of, rest_overlap_share
   use rest_depth_m, only: heaviest_mass
   use tet_mesh_m, only: shape_t, extreme_of_family
   use given_motion_m, only: fastest_between
@@ -438,7 +437,7 @@ contains
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
-      k = law%normal_constant(mass, heaviest, give_share*shapes(s)%smallest_edge)
+      k = law%normal_constant(mass, heaviest, rest_overlap_share*shapes(s)%smallest_edge)
       units = ' N/m'
       if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) units = ' N/m^'//brief(law%gamma_n)
       call entry(unit, 'stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))

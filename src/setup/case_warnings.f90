@@ -5,7 +5,7 @@ module case_warnings_m
   use case_types_m, only: case_t, shape_input_t, place_t, is_given, &
     smallest_spacing, has_flow
   use run_groups_m, only: side_name
-  use rigid_body_m, only: turning_share
+  use case_blocks_m, only: turning_share
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
   use vectors_m, only: rotation_matrix
   use drops_m, only: place_of_block, place_of_body, shape_of_place

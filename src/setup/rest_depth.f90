@@ -7,8 +7,7 @@ module rest_depth_m
   use drops_m, only: count_of_shape
   use tet_mesh_m, only: shape_t, extreme_of_family
   use contact_law_m, only: contact_law_t, load_t
-  use contact_laws_m, only: choose_law
-  use contact_load_m, only: load_of, hard_depth, depth_at_rest, give_share
+  use contact_laws_m, only: choose_law, load_of, hard_depth, depth_at_rest, rest_overlap_share
   use law_restitution_m, only: min_restitution
   implicit none
   private
@@ -24,7 +23,7 @@ contains
     type(problems_t), intent(inout) :: warnings
     class(contact_law_t), allocatable :: law
     type(load_t) :: heaviest
-    real(wp) :: depth, give
+    real(wp) :: depth, rest_overlap
     integer :: s
 
     if (size(case%body) + size(case%drop) == 0) return
@@ -38,8 +37,8 @@ contains
     do s = 1, size(shapes)
       if (n_free(case, shapes(s)) == 0 .or. .not. extreme_of_family(shapes, s)) cycle
       depth = rest_depth(case, shapes(s), law, heaviest)
-      give = give_share*shapes(s)%smallest_edge
-      if (.not. depth > 1.000001_wp*give) cycle   ! the law itself may aim at it
+      rest_overlap = rest_overlap_share*shapes(s)%smallest_edge
+      if (.not. depth > 1.000001_wp*rest_overlap) cycle   ! the law itself may aim at it
       if (case%contact%law == 'restitution') then
         call warnings%add('&contact contact_time', case%contact%contact_time, sinks(s) &
           //'; a shorter one makes blocks stiffer')
@@ -54,7 +53,7 @@ contains
 
       text = 'blocks '//trim(shapes(s)%name)//' give way by '//brief(depth, 2)//' m at rest, ' &
         //brief(100.0_wp*depth/shapes(s)%smallest_edge, 2)//' % of their size, above ' &
-        //brief(100.0_wp*give_share)//' %'
+        //brief(100.0_wp*rest_overlap_share)//' %'
     end function sinks
   end subroutine look_at_rest
 
@@ -68,18 +67,18 @@ contains
     type(load_t), intent(in) :: heaviest
     real(wp) :: depth
     real(wp), parameter :: supports = 3.0_wp   ! of a block at rest, at least; of a sphere one
-    real(wp) :: mass, reduced, own, give, k
+    real(wp) :: mass, reduced, own, rest_overlap, k
 
     mass = shape%density*shape%volume
     own = mass*norm(case%fluid%gravity)
     if (shape%kind /= 'sphere') own = own/supports
-    give = give_share*shape%smallest_edge
+    rest_overlap = rest_overlap_share*shape%smallest_edge
     reduced = mass
     if (n_free(case, shape) > 1) reduced = 0.5_wp*mass
-    k = law%normal_constant(reduced, heaviest, give)
+    k = law%normal_constant(reduced, heaviest, rest_overlap)
     depth = depth_at_rest(law, k, hard_depth(shape), own)
     if (.not. heaviest%mass > mass) return
-    k = law%normal_constant(mass, heaviest, give)
+    k = law%normal_constant(mass, heaviest, rest_overlap)
     depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest%weight))
   end function rest_depth
 

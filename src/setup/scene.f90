@@ -11,7 +11,8 @@ module scene_m
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use drops_m, only: place_of_block, shape_of_place
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t

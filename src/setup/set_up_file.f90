@@ -12,7 +12,8 @@ module set_up_file_m
   use bed_m, only: bed_t
   use grid_m, only: grid_init
   use drops_m, only: place_of_block
-  use rigid_body_m, only: blocks_t, blocks_init, drift
+  use rigid_body_m, only: blocks_t, drift
+  use case_blocks_m, only: blocks_init
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
   use diagnostics_m, only: step_report_t, make_row

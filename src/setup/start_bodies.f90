@@ -11,7 +11,8 @@ module start_bodies_m
   use named_files_m, only: found_file
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use hdf5_file_m, only: h5_file_t
   implicit none
   private

@@ -9,7 +9,8 @@ module one_body_m
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use coupling_m, only: copy_motion
   implicit none
   private

@@ -7,7 +7,7 @@ module sample_state_m
   use solid_geometry_m, only: solid_geometry_init
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_init
+  use case_blocks_m, only: blocks_init
   use contacts_m, only: contact_solver_t, contacts_init
   use displacements_m, only: displacements_t
   use clock_m, only: clock_init

@@ -60,7 +60,7 @@ contains
       allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
         source=0.0_wp)
       allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
-      allocate (counterparts%give(bed_counterpart:3), source=1.0_wp)
+      allocate (counterparts%rest_overlap(bed_counterpart:3), source=1.0_wp)
       allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
       allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
       counterparts%inverse_mass(1:3) = 1/mass

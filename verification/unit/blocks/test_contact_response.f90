@@ -42,7 +42,7 @@ contains
     allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
       source=0.0_wp)
     allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
-    allocate (counterparts%give(bed_counterpart:3), source=1.0_wp)
+    allocate (counterparts%rest_overlap(bed_counterpart:3), source=1.0_wp)
     allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
     allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
     counterparts%inverse_mass(1:3) = 1/mass
@@ -172,12 +172,12 @@ contains
     allocate (response%frequency2(bed_counterpart:3))
     allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     counterparts%load = load_t(1.0e9_wp, 1.0e10_wp)
-    counterparts%give(1) = 1.0e-2_wp
+    counterparts%rest_overlap(1) = 1.0e-2_wp
     call add_ball_point(2, 1, [1.0_wp, 0.5_wp], points)
     call respond(points, law, counterparts, response)
     call check('stiffness under a load', response%k(:2), 1.0e12_wp*[1.0_wp, 0.5_wp], 1.0_wp)
     counterparts%load = load_t()
-    counterparts%give = 1.0_wp
+    counterparts%rest_overlap = 1.0_wp
   end subroutine check_load
 
   !> What the force of a contact point does to its counterparts is what its spring gives: F times

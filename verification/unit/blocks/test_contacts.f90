@@ -497,8 +497,8 @@ contains
       //'&shape name="plain" kind="cube" size=.02 refinement=1/ '//bodies, one)
     call begin(one%case, one, two)
     associate (spheres => two%contacts%detected%spheres)
-      spheres%skin = spheres%skin - 1.98_wp*spheres%free_way
-      spheres%free_way = 0.01_wp*spheres%free_way
+      spheres%skin = spheres%skin - 1.98_wp*spheres%valid_way
+      spheres%valid_way = 0.01_wp*spheres%valid_way
     end associate
     do n = 1, 3
       call move(one, 40, 1.0e-2_wp)

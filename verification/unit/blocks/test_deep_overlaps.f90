@@ -4,7 +4,7 @@ module test_deep_overlaps_m
   use check_m, only: check
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use deep_overlaps_m, only: deep_overlaps_t, store_overlap, store_points, warn_of_overlaps, &
-    overlap_fault, size_of_pair, ask_for_all, ask_for_deep
+    overlap_fault, size_of_pair, ask_for_deep
   use world_m, only: world_t, set_up
   implicit none
   private
@@ -53,7 +53,7 @@ contains
 
   !> Between rows, overlaps of the bodies that move with a contact deeper than 2.5 % of the smaller.
   subroutine check_asked()
-    call ask_for_all(deep)
+    deep%asked = .true.
     call check('all', all(deep%asked))
     points%n = 0
     call add_point(contact_point_t(2, 1, 1, depth=0.00049_wp), points)

@@ -12,7 +12,8 @@ module test_ground_m
   use case_check_m, only: make_shapes
   use bed_file_m, only: bed_form_t
   use bed_m, only: set_bed
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use walls_m, only: walls_t, walls_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth
   use ground_m, only: height_on_top, way_down, ground_gap, nothing_below

@@ -4,8 +4,9 @@ module test_rigid_body_m
   use check_m, only: check
   use tet_mesh_m, only: shape_t
   use vectors_m, only: quaternion_exp, rotation_matrix
-  use rigid_body_m, only: blocks_t, blocks_init, release_body, begin_step, drift, kick, &
+  use rigid_body_m, only: blocks_t, release_body, begin_step, drift, kick, &
     set_velocity_after_fluid, space_tensor, kinetic_energy, potential_energy
+  use case_blocks_m, only: blocks_init
   use world_m, only: world_t, set_up
   implicit none
   private

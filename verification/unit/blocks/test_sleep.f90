@@ -6,7 +6,7 @@ module test_sleep_m
   use check_m, only: check
   use rigid_body_m, only: release_body, kinetic_energy, potential_energy, set_velocity_after_fluid
   use displacements_m, only: reserve_displacements
-  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_poses, store_quiet, &
+  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_quiet, &
     may_sleep, update_loads
   use world_m, only: world_t, set_up, begin, body, move
   implicit none
@@ -95,7 +95,8 @@ contains
     type(sleep_t), intent(inout) :: sleep
 
     associate (blocks => world%blocks)
-      call store_poses(blocks, sleep)
+      sleep%x = blocks%x
+      sleep%q = blocks%q
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
         turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))

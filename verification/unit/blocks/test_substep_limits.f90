@@ -44,7 +44,7 @@ contains
     limits = limits_t(0.5_wp, 0.01_wp, 0.1_wp)
     detected%bounding_radius = [0.1_wp, 0.1_wp]
     detected%smallest = 0.02_wp
-    detected%clear = 0.05_wp
+    detected%unlisted_gap = 0.05_wp
     call check('a share of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), &
       0.005_wp, 0.0_wp)
     call check('of the contact time', substep_limit(walls, detected, blocks, 1.0_wp, limits), &

@@ -9,7 +9,8 @@ module test_liquid_fill_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use liquid_fill_m, only: fill_liquid, raise_surface, liquid_volume

@@ -13,7 +13,8 @@ module test_liquid_transport_m
   use vectors_m, only: quaternion_from_axis
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use box_solid_m, only: set_boxes, simple_grid
   use check_m, only: check, checked

@@ -12,11 +12,12 @@ module test_bed_m
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
   use shapes_builtin_m, only: make_shape
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t, blocks_init, release_body
+  use rigid_body_m, only: blocks_t, release_body
+  use case_blocks_m, only: blocks_init
   use random_counter_m, only: uniform, random_rotation
   use surface_search_m, only: found_t, nowhere
   use walls_m, only: walls_t, walls_init
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, has_place, max_overlap
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
@@ -457,7 +458,7 @@ contains
       call blocks_init(case, shapes, blocks)
       call overlap_init(shapes, 1, overlap)
       call deep_overlaps_init(blocks, deep)
-      call ask_for_all(deep)
+      deep%asked = .true.
       call max_overlap(walls, blocks, overlap, depth, deep)
       exact = overlap_depth(shapes(1), blocks%x(:, 1), blocks%q(:, 1), shapes(1), x, &
         [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])

@@ -9,7 +9,8 @@ module test_unknown_names_m
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use drops_m, only: place_of_block
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use contact_detection_m, only: contact_detection_t, detection_init
   use grid_m, only: grid_t, grid_init
   use tvd_m, only: scheme_of

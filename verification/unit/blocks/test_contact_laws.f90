@@ -1,25 +1,24 @@
 !> Load of contact points at rest, and how far they give way.
-module test_contact_load_m
+module test_contact_laws_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, load_t, stiffness_t
-  use contact_laws_m, only: choose_law
-  use contact_load_m, only: load_of, hard_depth, depth_at_rest
+  use contact_laws_m, only: choose_law, load_of, hard_depth, depth_at_rest
   use counterparts_m, only: counterparts_t, counterparts_init, update_counterparts
   use world_m, only: world_t, set_up
   implicit none
   private
-  public :: test_contact_load
+  public :: test_contact_laws
 
   real(wp), parameter :: g = 9.81_wp, size(2) = [0.02_wp, 0.3_wp]
 
 contains
 
-  subroutine test_contact_load()
+  subroutine test_contact_laws()
     call check_depth()
     call check_heaviest()
-  end subroutine test_contact_load
+  end subroutine test_contact_laws
 
   !> The depth at which the spring holds a force, shallow, hardened, and with a power law.
   subroutine check_depth()
@@ -65,7 +64,7 @@ contains
     call check('the heaviest', counterparts%load%mass, world%blocks%mass(2), 0.0_wp)
     call check('its weight', counterparts%load%weight, world%blocks%mass(2)*g, &
       1.0e-12_wp*load%weight)
-    call check('may give way', counterparts%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
+    call check('may give way', counterparts%rest_overlap(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
     world%blocks%fixed(2) = .true.
     call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
     call check('nobody carries a held one', counterparts%load%mass, world%blocks%mass(1), 0.0_wp)
@@ -74,4 +73,4 @@ contains
     call check('all held: no load', counterparts%load%mass, 0.0_wp, 0.0_wp)
   end subroutine check_heaviest
 
-end module test_contact_load_m
+end module test_contact_laws_m
