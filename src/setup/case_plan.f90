@@ -5,7 +5,8 @@ module case_plan_m
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, contact_input_t, is_given, &
     smallest_spacing, has_flow, contact_of, not_resolved
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_t
+  use case_blocks_m, only: blocks_init
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: file_text
   use contact_law_m, only: contact_law_t, load_t
