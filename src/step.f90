@@ -195,17 +195,18 @@ contains
     report%transport_parts = sim%transport%liquid%subcycles
     report%transport_converged = sim%transport%liquid%small%converged
     report%inertia_clips = report%inertia_clips + count(sim%coupling%bodies%clipped)
-    report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%coupling%tension%surface%fallback
   end subroutine describe
 
   !> Blocks that have passed an open side go; those whose time has come enter, with the force and
   !! the pressure with which they begin to move.
   subroutine release(sim, report)
-    type(simulation_t), intent(inout) :: sim
+    type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(inout) :: report
     type(fluid_sums_t) :: fluid
-    logical :: released
+    real(wp), allocatable :: force(:, :)
+    logical :: released, begins(sim%blocks%n)
+    integer :: b
 
     call follow_motions(sim%clock%t, sim%blocks)
     call take_out(sim%grid, sim%case%fluid%gravity, sim%clock%t, sim%blocks)
@@ -221,19 +222,11 @@ contains
       fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
       call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
     end if
-    call first_force(sim)
-  end subroutine release
-
-  !> A block that has just appeared gets the force of a fluid at rest when it is let go; after
-  !! each step the fluid force of that step takes over.
-  subroutine first_force(sim)
-    type(simulation_t), intent(inout), target :: sim
-    real(wp) :: force(6, size(sim%coupling%total, 2))
-    logical :: begins(sim%blocks%n)
-    integer :: b
-
     begins = sim%blocks%present .and. .not. sim%initialised
     if (.not. any(begins)) return
+    ! one that has just appeared gets the force of a fluid at rest when it is let go; after each
+    ! step the fluid force of that step takes over
+    allocate (force(6, size(sim%coupling%total, 2)))
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
       sim%clock%dt), begins, force)
@@ -243,7 +236,7 @@ contains
       sim%blocks%fluid_torque(:, b) = force(4:6, b)
       sim%initialised(b) = .true.
     end do
-  end subroutine first_force
+  end subroutine release
 
   !> What acts before the transport, and what the later stages need of the start of the step.
   subroutine begin(sim, dt_before, n_clipped)

@@ -28,7 +28,7 @@ module body_shares_m
   use grid_m, only: grid_t
   use tet_mesh_m, only: shape_t
   use share_lists_m, only: body_shares_t, start_lists, full_face
-  use share_row_m, only: share_row_t, ensure_row, sum_row, close_columns, close_full_cells, &
+  use share_row_m, only: share_row_t, ensure_row, sum_row, close_columns, &
     list_row, hits_along_y
   implicit none
   private
@@ -64,7 +64,6 @@ contains
     do j = self%low(2), self%high(2)
       call sum_row(shape, j, self, work)
       call close_columns(self, work)
-      call close_full_cells(self, work)
       call list_row(j, self, work)
     end do
     call hits_along_y(shape, self, work)

@@ -31,7 +31,7 @@ module monolithic_m
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use wall_layer_m, only: find_slip, find_centres, to_centres, find_wall_speeds
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
+  use wall_balance_m, only: wall_balance_t, begin_balance, add_push, &
                             store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
@@ -93,7 +93,6 @@ contains
     allocate (self%merged_before, self%merged)
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
-    call wall_balance_init(self%balance)
     allocate (self%defect(6, 3, n), self%held(6, 3, n), source=0.0_wp)
     allocate (self%held_motion, self%left_over, self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -110,8 +109,21 @@ contains
     type(stage_t), intent(in) :: s
     type(blocks_t), intent(in) :: blocks
     type(merged_cells_t), allocatable :: keep
+    integer :: b
 
-    call extrapolate_motion(self%fluid%gravity, s%dt, blocks, self)
+    ! what the motion changes by in this step if the bodies accelerate as in the step before, like
+    ! the fluid that gets the old pressure
+    self%extrapolated = 0.0_wp
+    do b = 1, blocks%n
+      if (blocks%path(b)%n > 0 .and. blocks%present(b)) then
+        self%extrapolated(:, b) = change_by_motion(blocks, b, s%dt)
+      end if
+      if (.not. self%bodies%free(b)) cycle
+      self%extrapolated(1:3, b) = s%dt*(self%fluid%gravity + (blocks%fluid_force(:, b) &
+                                                 + blocks%contact_force(:, b))/blocks%mass(b))
+      self%extrapolated(4:6, b) = s%dt*matmul(self%bodies%inverse_inertia(:, :, b), &
+                                    blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
+    end do
     ! the merged cells of the end of the last step, or new ones if blocks have come
     call move_alloc(self%merged_before, keep)
     call move_alloc(self%merged, self%merged_before)
@@ -135,28 +147,6 @@ contains
       end if
     end associate
   end subroutine begin
-
-  !> What the motion changes by in this step if the bodies accelerate as in the step before, like
-  !! the fluid that gets the old pressure.
-  subroutine extrapolate_motion(gravity, dt, blocks, self)
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in) :: dt           !! [s]
-    type(blocks_t), intent(in) :: blocks
-    class(monolithic_t), intent(inout) :: self
-    integer :: b
-
-    self%extrapolated = 0.0_wp
-    do b = 1, blocks%n
-      if (blocks%path(b)%n > 0 .and. blocks%present(b)) then
-        self%extrapolated(:, b) = change_by_motion(blocks, b, dt)
-      end if
-      if (.not. self%bodies%free(b)) cycle
-      self%extrapolated(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) &
-                                                 + blocks%contact_force(:, b))/blocks%mass(b))
-      self%extrapolated(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
-                                      blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
-    end do
-  end subroutine extrapolate_motion
 
   !> Stage 9: small cells at the new places and their targets, one momentum for each group; inertia
   !! of the fluid in cut cells; how fast the fluid runs past the walls.

@@ -1,13 +1,14 @@
 !> Sealed pockets: cut cells from which no open faces lead to a cell without solid.
 module pockets_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_kinds_m, only: is_wall
   use solid_geometry_m, only: solid_geometry_t, set_faces
   use parallel_m, only: halo_exchange, global_sum
   implicit none
   private
-  public :: pockets_t, pockets_init, close_pockets
+  public :: pockets_t, close_pockets
 
   type :: pockets_t
     integer :: low(3) = 1, high(3) = 0            !! first and last cell where the solids are kept
@@ -19,15 +20,6 @@ module pockets_m
 
 contains
 
-  subroutine pockets_init(low, high, self)
-    integer, intent(in) :: low(3), high(3)   !! first and last cell where the solids are kept
-    type(pockets_t), intent(out) :: self
-
-    self%low = low
-    self%high = high
-    allocate (self%reached(0), self%stack(0))
-  end subroutine pockets_init
-
   !> Close the faces of cut cells from which no open faces lead to a cell without solid.
   subroutine close_pockets(grid, self, solid)
     type(grid_t), intent(in) :: grid
@@ -36,10 +28,8 @@ contains
     integer(i8) :: left(1), changed(1)
     integer :: m
 
-    if (size(self%reached) < solid%n_cut) then
-      deallocate (self%reached, self%stack)
-      allocate (self%reached(2*solid%n_cut), self%stack(2*solid%n_cut))
-    end if
+    call ensure_capacity(solid%n_cut, self%reached)
+    call ensure_capacity(solid%n_cut, self%stack)
     do m = 1, solid%n_cut
       self%reached(m) = .false.
     end do

@@ -9,7 +9,7 @@ module share_row_m
   use share_lists_m, only: body_shares_t, add_cell, add_face, add_hit, full_cell
   implicit none
   private
-  public :: share_row_t, ensure_row, sum_row, close_columns, close_full_cells, list_row
+  public :: share_row_t, ensure_row, sum_row, close_columns, list_row
   public :: hits_along_y
 
   real(wp), parameter :: min_share = 1.0e-13_wp     !! smaller shares are dropped
@@ -276,11 +276,13 @@ contains
     end do
   end subroutine close_columns
 
-  !> A cell that is full but for round-off has six closed faces.
-  pure subroutine close_full_cells(self, work)
-    type(body_shares_t), intent(in) :: self
+  !> List the cells and faces of a row that hold part of the body; a cell that is full but for
+  !! round-off has six closed faces.
+  subroutine list_row(j, self, work)
+    integer, intent(in) :: j
+    type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
-    integer :: i, k
+    integer :: i, k, d
     logical :: full
 
     do k = self%low(3), self%high(3)
@@ -288,22 +290,8 @@ contains
         full = work%volume(1, i, k) > 1.0_wp - full_cell
         if (full .or. work%full(i, k)) work%area(1, i, k, 2) = 1.0_wp
         work%full(i, k) = full
-        if (.not. full) cycle
-        work%area(1, i:i + 1, k, 1) = 1.0_wp
-        work%area(1, i, k:k + 1, 3) = 1.0_wp
-      end do
-    end do
-  end subroutine close_full_cells
-
-  !> List the cells and faces of a row that hold part of the body.
-  subroutine list_row(j, self, work)
-    integer, intent(in) :: j
-    type(body_shares_t), intent(inout) :: self
-    type(share_row_t), intent(in) :: work
-    integer :: i, k, d
-
-    do k = self%low(3), self%high(3)
-      do i = self%low(1), self%high(1)
+        if (full) work%area(1, i:i + 1, k, 1) = 1.0_wp
+        if (full) work%area(1, i, k:k + 1, 3) = 1.0_wp
         if (work%volume(1, i, k) > min_share) then
           call add_cell([i, j, k], work%volume(1:4, i, k), work%crossings(i, k) > 0, self)
         end if

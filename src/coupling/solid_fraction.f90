@@ -23,7 +23,7 @@ module solid_fraction_m
     voxelise_cells, voxelise_faces, voxelise_links
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links, tets_of_cut_cells
   use effective_aperture_m, only: find_effective_apertures
-  use pockets_m, only: pockets_t, pockets_init, close_pockets
+  use pockets_m, only: pockets_t, close_pockets
   implicit none
   private
   public :: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
@@ -80,7 +80,7 @@ contains
     if (self%has_bed) n = n + 1
     allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
     call voxels_init(grid, n, self%voxels)
-    call pockets_init(self%voxels%low, self%voxels%high, self%pockets)
+    self%pockets = pockets_t(self%voxels%low, self%voxels%high)
   end subroutine solid_fraction_init
 
   !> Fill the solid geometry for the poses of the bodies present.
@@ -89,8 +89,21 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_geometry_t), intent(inout) :: solid
+    logical :: same
+    integer :: b
 
-    call number_poses(blocks, self)
+    same = self%poses > 0   ! else the poses get another number
+    do b = 1, blocks%n
+      same = same .and. (blocks%present(b) .eqv. self%present(b)) &
+             .and. all(abs(blocks%x(:, b) - self%x(:, b)) <= 0.0_wp) &
+             .and. all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)
+    end do
+    if (.not. same) then
+      self%poses = self%poses + 1
+      self%present = blocks%present
+      self%x = blocks%x
+      self%q = blocks%q
+    end if
     if (solid%poses == self%poses) return
     solid%poses = self%poses
     call find_shares(grid, blocks, self)
@@ -116,28 +129,6 @@ contains
     call close_pockets(grid, self%pockets, solid)
     call find_effective_apertures(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
   end subroutine update_solid
-
-  !> Give the poses of the bodies another number if they are others than at the last call.
-  pure subroutine number_poses(blocks, self)
-    type(blocks_t), intent(in) :: blocks
-    type(solid_fraction_t), intent(inout) :: self
-    logical :: same
-    integer :: b
-
-    same = self%poses > 0
-    do b = 1, blocks%n
-      same = same .and. (blocks%present(b) .eqv. self%present(b)) &
-             .and. all(abs(blocks%x(:, b) - self%x(:, b)) <= 0.0_wp) &
-             .and. all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)
-    end do
-    if (same) return
-    self%poses = self%poses + 1
-    do b = 1, blocks%n
-      self%present(b) = blocks%present(b)
-      self%x(:, b) = blocks%x(:, b)
-      self%q(:, b) = blocks%q(:, b)
-    end do
-  end subroutine number_poses
 
   !> Shares of every body that is near the cells of this process and has moved.
   subroutine find_shares(grid, blocks, self)

@@ -37,7 +37,6 @@ module diagnostics_m
     logical :: overlap_known = .false.        !! measured for rows only
     real(wp) :: contact_courant_max = 0.0_wp  !! C_s of eq. (6) [-]
     integer :: substeps = 0
-    integer :: sealed_cells = 0               !! cells without any open face that held fluid
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
     integer :: inertia_clips = 0              !! limits of added inertia that cut it
     integer :: warnings = 0                   !! printed in this step

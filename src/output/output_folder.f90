@@ -151,6 +151,7 @@ contains
     integer, intent(out) :: code
     character(:), allocatable, intent(out) :: message
     character(:), allocatable :: from
+    integer :: i, made
 
     code = exit_ok
     message = ''
@@ -165,32 +166,24 @@ contains
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
       call share_outcome(code, message)
       if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
-      if (code == exit_ok .and. is_root()) call copy_results(from, lock, code, message)
+      if (code == exit_ok .and. is_root()) then   ! the result files, all or none
+        made = 0
+        do i = 1, size(result_file)
+          if (code /= exit_ok) exit
+          if (exists(from//'/'//trim(result_file(i)))) call copy_file(from, trim(result_file(i)), &
+            lock, code, message)
+          if (code == exit_ok) made = i
+        end do
+        if (code /= exit_ok) then
+          do i = 1, made
+            call lock%remove(trim(result_file(i)))
+          end do
+          call lock%release()
+        end if
+      end if
     end if
     call share_outcome(code, message)
   end subroutine continue_folder
-
-  !> Copy the result files of a run to a new folder, all or none.
-  subroutine copy_results(from, lock, code, message)
-    character(*), intent(in) :: from
-    type(folder_lock_t), intent(inout) :: lock             !! of the new folder
-    integer, intent(inout) :: code
-    character(:), allocatable, intent(inout) :: message
-    integer :: i, made
-
-    made = 0
-    do i = 1, size(result_file)
-      if (code /= exit_ok) exit
-      if (exists(from//'/'//trim(result_file(i)))) call copy_file(from, trim(result_file(i)), &
-        lock, code, message)
-      if (code == exit_ok) made = i
-    end do
-    if (code == exit_ok) return
-    do i = 1, made
-      call lock%remove(trim(result_file(i)))
-    end do
-    call lock%release()
-  end subroutine copy_results
 
   !> The root process broadcasts code and message.
   subroutine share_outcome(code, message)

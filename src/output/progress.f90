@@ -76,7 +76,9 @@ contains
     type(blocks_t), intent(in) :: blocks
     character(*), parameter :: block_columns = '   released  moving  asleep overlap [mm]'
     character(160) :: line
-    integer :: released
+    character(11) :: left
+    real(wp) :: seconds
+    integer :: released, s
 
     if (.not. self%shown .or. clock%step == self%last_step) return
     self%last_step = clock%step
@@ -103,7 +105,15 @@ contains
       //to_text(blocks%n), count(blocks%speed > clock%run%rest_speed), count(blocks%asleep), &
       1.0e3_wp*of('max_overlap')
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') of('liquid_volume_drift')
-    call say(trim(line)//time_left(self, clock), self)
+    ! wall time to the end at the mean speed so far, as h:mm:ss
+    seconds = 3.6e6_wp
+    if (clock%t > self%first_time) seconds = (wall_clock() - self%began)*(clock%t_end - clock%t) &
+      /(clock%t - self%first_time)
+    left = '          -'
+    s = nint(min(seconds, 3.6e6_wp))
+    if (seconds < 3.6e6_wp) write (left, '(i5, 2(":", i2.2))') s/3600, modulo(s/60, 60), &
+      modulo(s, 60)
+    call say(trim(line)//left, self)
   contains
     pure real(wp) function of(name)
       character(*), intent(in) :: name
@@ -123,22 +133,6 @@ contains
     if (info == 0) flush (output_unit, iostat=info)
     self%shown = info == 0
   end subroutine say
-
-  !> Wall time to the end at the mean speed so far, as h:mm:ss.
-  function time_left(self, clock) result(text)
-    type(progress_t), intent(in) :: self
-    type(clock_t), intent(in) :: clock
-    character(11) :: text
-    real(wp) :: seconds
-    integer :: s
-
-    text = '          -'
-    if (clock%t <= self%first_time) return
-    seconds = (wall_clock() - self%began)*(clock%t_end - clock%t)/(clock%t - self%first_time)
-    if (seconds >= 3.6e6_wp) return
-    s = nint(seconds)
-    write (text, '(i5, 2(":", i2.2))') s/3600, modulo(s/60, 60), modulo(s, 60)
-  end function time_left
 
   !> Say how the run went.
   subroutine write_summary(self, clock, cells, exit_code, folder)

@@ -87,7 +87,10 @@ contains
     type(run_state_t), intent(inout) :: state   !! its solids stay: they follow from the poses
     integer, intent(out) :: info   !! 0: read; 1: the file is no good; 2: the case has changed
     character(:), allocatable, intent(out) :: message
+    character(*), parameter :: last(2) = ['a.h5', 'b.h5']
     type(solid_geometry_t), allocatable :: solid
+    logical :: there
+    integer :: i, n
 
     call move_alloc(state%solid, solid)
     allocate (state%solid)
@@ -97,7 +100,16 @@ contains
     end if
     call read_state(path, parameters, state, info, message)
     call move_alloc(solid, state%solid)
-    if (info == 1) message = message//'; a run cannot go on from it'//other_file(path)
+    if (info == 1) then
+      message = message//'; a run cannot go on from it'
+      n = len(path) - len(last)
+      do i = 1, 2   ! with the one written before or after it, if it is there
+        if (n < 0) exit
+        if (path(n + 1:) /= last(i)) cycle
+        inquire (file=path(:n)//last(3 - i), exist=there)
+        if (there) message = message//'; the other one is there: --restart '//path(:n)//last(3 - i)
+      end do
+    end if
     if (info /= 0) return
     if (state%clock%t_end < state%clock%t) then
       info = 2
@@ -110,26 +122,6 @@ contains
       call clock%restarts%plan(clock%t)
     end associate
   end subroutine read_restart
-
-  !> Where to go on when a restart file is no good: with the one written before or after it.
-  function other_file(path) result(hint)
-    character(*), intent(in) :: path
-    character(:), allocatable :: hint
-    character(*), parameter :: last(2) = ['a.h5', 'b.h5']
-    character(:), allocatable :: other
-    logical :: there
-    integer :: i, n
-
-    hint = ''
-    n = len(path) - len(last)
-    do i = 1, 2
-      if (n < 0) exit
-      if (path(n + 1:) /= last(i)) cycle
-      other = path(:n)//last(3 - i)
-      inquire (file=other, exist=there)
-      if (there) hint = '; the other one is there: --restart '//other
-    end do
-  end function other_file
 
   !> Read all of a state, and check that it has its checksum.
   subroutine read_state(path, parameters, state, info, message)

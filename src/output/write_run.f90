@@ -3,7 +3,7 @@
 !! Only the root process writes. Each row is flushed, so that a fault loses nothing already
 !! computed.
 module write_run_m
-  use kinds_m, only: wp, name_length
+  use kinds_m, only: wp
   use parallel_m, only: is_root, nproc, get_threads
   use timers_m, only: phases, phase_t
   use build_info_m, only: version, git_revision, compiler, flags
@@ -82,7 +82,12 @@ contains
         call file%store('/grid/'//axis(d:d), 'm', grid%face([(i, i=1, grid%n(d) + 1)], d))
       end do
       call write_shapes(blocks, file)
-      call write_bodies(blocks, file)
+      call file%group('/bodies')
+      call file%store('/bodies/shape', '1', blocks%shapes(blocks%shape)%name)
+      call file%store('/bodies/mass', 'kg', [(own_mass(blocks, i), i=1, blocks%n)])
+      call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
+      call file%store('/bodies/name', '1', blocks%name)
+      call file%store('/bodies/planned', 'm', [blocks%planned], shape(blocks%planned))
       call store_once(blocks, .true., self)
       call file%attribute('/bodies/status', 'meaning', '0 not there yet, 1 being lowered, ' &
         //'2 released, 3 left out, 4 out of the tank')
@@ -157,24 +162,6 @@ contains
       end associate
     end do
   end subroutine write_shapes
-
-  !> What is said once of each block.
-  subroutine write_bodies(blocks, file)
-    type(blocks_t), intent(in) :: blocks
-    type(h5_file_t), intent(inout) :: file
-    character(name_length) :: name(blocks%n)
-    integer :: b
-
-    do b = 1, blocks%n
-      name(b) = blocks%shapes(blocks%shape(b))%name
-    end do
-    call file%group('/bodies')
-    call file%store('/bodies/shape', '1', name)
-    call file%store('/bodies/mass', 'kg', [(own_mass(blocks, b), b=1, blocks%n)])
-    call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
-    call file%store('/bodies/name', '1', blocks%name)
-    call file%store('/bodies/planned', 'm', [blocks%planned], shape(blocks%planned))
-  end subroutine write_bodies
 
   !> What may change once or twice in a run: overwrite what differs from the file, or all.
   subroutine store_once(blocks, every, self)

@@ -76,7 +76,8 @@ contains
     type(problems_t), intent(inout) :: problems
     type(scene_t) :: scene
     type(case_t) :: known   ! the case without the sides that are wrong
-    integer :: i
+    character(:), allocatable :: where_to
+    integer :: b, i
 
     known = with_begun(case)
     where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
@@ -84,7 +85,13 @@ contains
     if (.not. case%grid%extent_faulty) call check_lengths(known, shapes, problems)
     call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
-    if (.not. case%grid%extent_faulty) call check_places(known, scene, problems)
+    do b = 1, merge(0, scene%n_bodies, case%grid%extent_faulty)   ! inside the tank?
+      where_to = way_out(known, scene, b)
+      scene%outside(b) = len(where_to) > 0
+      if (scene%outside(b)) call problems%add_message('&body position = ' &
+        //to_text(scene%blocks%x(:, b))//': '//where_to//'; a body must lie inside the tank', &
+        scene%line(b))
+    end do
     call check_pairs(known, scene, problems)
     if (case%grid%extent_faulty) return
     do i = 1, size(case%drop)
@@ -163,24 +170,6 @@ contains
     end do
     length = sqrt(length)
   end function longest_line
-
-  !> Every body lies inside the tank; through an open top it may stick out.
-  subroutine check_places(case, scene, problems)
-    type(case_t), intent(in) :: case
-    type(scene_t), intent(inout) :: scene
-    type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: where_to
-    integer :: b
-
-    do b = 1, scene%n_bodies
-      where_to = way_out(case, scene, b)
-      scene%outside(b) = len(where_to) > 0
-      if (scene%outside(b)) then
-        call problems%add_message('&body position = '//to_text(scene%blocks%x(:, b))//': ' &
-                                  //where_to//'; a body must lie inside the tank', scene%line(b))
-      end if
-    end do
-  end subroutine check_places
 
   !> Bodies do not overlap at the start; one that is released later finds no held body in its place.
   subroutine check_pairs(case, scene, problems)

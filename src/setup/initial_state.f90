@@ -163,7 +163,7 @@ contains
     type(flow_t), intent(inout) :: flow
     type(h5_file_t) :: file
     real(wp), allocatable :: part(:), values(:, :, :, :)
-    integer :: d, extent(3)
+    integer :: i, j, k, d, e(3), extent(3)
 
     if (.not. is_named(fluid)) return
     call file%open(found_file(fluid%initial_state), .false., .false.)
@@ -178,29 +178,20 @@ contains
         end do
       end associate
       call fill_velocity_halo(grid, flow%u)
-      call faces_between_cells(grid, flow)
+      do d = 1, 3   ! of the faces: mean of the two cells; the halo makes it that of the wall there
+        e = unit_step(:, d)
+        do k = grid%first(3) + 1, grid%last(3)
+          do j = grid%first(2) + 1, grid%last(2)
+            do i = grid%first(1) + 1, grid%last(1)
+              flow%uf(i, j, k, d) = 0.5_wp*(flow%u(i - e(1), j - e(2), k - e(3), d) &
+                                            + flow%u(i, j, k, d))
+            end do
+          end do
+        end do
+      end do
     end if
     call file%close()
     if (file%info /= 0) call fatal(exit_files, file%message)
   end subroutine read_initial_velocity
-
-  !> Normal velocity of the faces: mean of the two cells; the halo makes it that of the wall there.
-  pure subroutine faces_between_cells(grid, flow)
-    type(grid_t), intent(in) :: grid
-    type(flow_t), intent(inout) :: flow
-    integer :: i, j, k, d, e(3)
-
-    do d = 1, 3
-      e = unit_step(:, d)
-      do k = grid%first(3) + 1, grid%last(3)
-        do j = grid%first(2) + 1, grid%last(2)
-          do i = grid%first(1) + 1, grid%last(1)
-            flow%uf(i, j, k, d) = 0.5_wp*(flow%u(i - e(1), j - e(2), k - e(3), d) &
-                                          + flow%u(i, j, k, d))
-          end do
-        end do
-      end do
-    end do
-  end subroutine faces_between_cells
 
 end module initial_state_m

@@ -19,7 +19,7 @@ module wall_balance_m
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   implicit none
   private
-  public :: wall_balance_t, wall_balance_init, begin_balance, add_push, store_velocity
+  public :: wall_balance_t, begin_balance, add_push, store_velocity
   public :: force_of_walls, add_to_bodies
 
   integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
@@ -33,13 +33,6 @@ module wall_balance_m
   end type wall_balance_t
 
 contains
-
-  !> Empty lists.
-  subroutine wall_balance_init(self)
-    type(wall_balance_t), intent(out) :: self
-
-    allocate (self%mass(0), self%moved(3, 0), self%before(3, 0), self%to_wall(3, 0))
-  end subroutine wall_balance_init
 
   !> The masses of the wall cells; the walls bear nothing yet. `rho` of the wall cells becomes that
   !! of the fluid in their open part.

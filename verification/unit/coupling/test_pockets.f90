@@ -4,7 +4,7 @@ module test_pockets_m
   use grid_m, only: grid_t
   use boundary_kinds_m, only: side_open
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use pockets_m, only: pockets_t, pockets_init, close_pockets
+  use pockets_m, only: pockets_t, close_pockets
   use box_solid_m, only: simple_grid
   use check_m, only: check
   implicit none
@@ -19,7 +19,7 @@ contains
 
   subroutine test_pockets()
     call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
-    call pockets_init([1, 1, 1], grid%n, pockets)
+    pockets = pockets_t([1, 1, 1], grid%n)
 
     call two_cells([3, 3, 2])
     call close_pockets(grid, pockets, solid)

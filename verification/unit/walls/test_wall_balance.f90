@@ -15,7 +15,7 @@ module test_wall_balance_m
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
   use merged_momentum_m, only: share_acceleration
   use half_kick_m, only: force_of_half_kick
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
+  use wall_balance_m, only: wall_balance_t, begin_balance, add_push, &
     force_of_walls
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check
@@ -51,7 +51,6 @@ contains
     call find_merged_cells(box%grid, box%solid, merged)
     call acceleration_init(box%grid, a)
     allocate (kick, mold=a%cell)
-    call wall_balance_init(balance)
     at_start = box%bodies
     call still_water()
     call agreement()
