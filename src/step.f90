@@ -53,7 +53,7 @@ module step_m
   use courant_m, only: courant_rate_t, courant_rate
   use simulation_m, only: simulation_t, energies
   use light_m, only: step_in_water, enter_water, store_water_force
-  use wave_step_m, only: gravity_step, capillary_step
+  use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use timers_m, only: tic, toc
   implicit none
   private
@@ -285,7 +285,8 @@ contains
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
       if (rate%has_surface) then
         h = sim%grid%min_spacing()
-        allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
+        allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h), &
+          viscous_step(sim%case%fluid, sum(1.0_wp/sim%grid%h**2, sim%grid%n > 1)))
       end if
     end if
     call sim%clock%choose_step(allowed, min(sim%next_let_go, &

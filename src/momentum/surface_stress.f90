@@ -4,8 +4,8 @@
 !! div(mu (grad u + grad u^T)),
 !! $$ \partial_j(\mu\, \partial_i u_j) = (\partial_j \mu)(\partial_i u_j) $$
 !! for div u = 0, is zero in one fluid, but makes half of the dissipation of waves: without it the
-!! surface is free of mu du/dn instead of free of all stress. It is added explicitly; it is never
-!! larger than the implicit part, so the step stays stable whatever its length. Cells beside bodies
+!! surface is free of mu du/dn instead of free of all stress. It is added explicitly, which bounds
+!! the step of very viscous liquids (`viscous_step`). Cells beside bodies
 !! are left out: before the viscous stage their thin small cells may carry any velocity (with them a
 !! block thrown into water ended two runs).
 module surface_stress_m

@@ -15,7 +15,7 @@ module case_plan_m
   use tet_mesh_m, only: shape_t, extreme_of_family
   use given_motion_m, only: fastest_between
   use bed_m, only: bed_t
-  use wave_step_m, only: gravity_step, capillary_step
+  use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
   use plan_text_m, only: heading, entry, left, right, triple, place_text, count_text
@@ -334,7 +334,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     logical, intent(in) :: wet
-    real(wp) :: h
+    real(wp) :: h, limit
 
     call heading(unit, 'Time steps')
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
@@ -355,6 +355,9 @@ contains
       if (capillary_step(case%fluid, h) < huge(h)) then
         call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')
       end if
+      limit = viscous_step(case%fluid, sum((case%grid%cells/case%grid%length)**2, &
+        case%grid%cells > 1))
+      if (limit < case%run%dt) call entry(unit, 'viscous surface', brief(limit)//' s')
     end if
     if (case%run%physics /= 'fluid' .and. size(blocks%shapes) > 0) call print_body_steps(unit, &
       case, blocks%shapes, d_s)

@@ -10,7 +10,7 @@ module test_surface_tension_m
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
   use surface_tension_m, only: surface_tension_t, surface_tension_init, find_tension, add_tension, &
                                force_from_tension
-  use wave_step_m, only: gravity_step, capillary_step
+  use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use box_solid_m, only: simple_grid, set_boxes
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check
@@ -331,6 +331,8 @@ contains
     type(fluid_t) :: light
 
     call check('capillary step [s]', capillary_step(fluid, 1.0e-3_wp), 1.0659e-3_wp, 1.0e-8_wp)
+    call check('viscous step [s]', viscous_step(fluid_t(liquid_density=800.0_wp, &
+      liquid_viscosity=4.0_wp, gas_viscosity=1.0_wp), 2.0e4_wp), 2.0_wp/75.0_wp, 1.0e-12_wp)
     call check('none without tension', capillary_step(fluid_t(), 1.0e-3_wp) > 1.0e300_wp)
     light%gas_density = 0.0_wp
     light%gravity = [0.0_wp, 3.0_wp, -4.0_wp]
