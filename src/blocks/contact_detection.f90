@@ -4,7 +4,6 @@ module contact_detection_m
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_points_t, groups_t, ensure_points, set_apart, &
     form_groups
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
@@ -72,12 +71,6 @@ contains
     end if
     call counterparts_init(blocks, self%counterparts)
     allocate (self%acting%body(blocks%n), source=0)
-    allocate (self%response%frequency2(bed_counterpart:blocks%n))
-    allocate (self%response_soon%frequency2(bed_counterpart:blocks%n))
-    allocate (self%response%stiffness(bed_counterpart:blocks%n))
-    allocate (self%response%damping(bed_counterpart:blocks%n))
-    allocate (self%response_soon%stiffness, mold=self%response%stiffness)
-    allocate (self%response_soon%damping, mold=self%response%damping)
     call ensure_points(1, self%points)
     call ensure_points(1, self%soon)
   end subroutine detection_init

@@ -54,6 +54,8 @@ contains
     type(response_t), intent(inout) :: response
     integer :: first, last
 
+    if (.not. allocated(response%frequency2)) allocate (response%frequency2, response%stiffness, &
+      response%damping, mold=counterparts%inverse_mass)
     response%frequency2 = 0.0_wp
     response%stiffness = 0.0_wp
     response%damping = 0.0_wp

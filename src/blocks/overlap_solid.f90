@@ -4,7 +4,7 @@ module overlap_solid_m
   use kinds_m, only: wp, i8
   use vectors_m, only: norms, cross, norm, inverse3
   use tet_mesh_m, only: shape_t, surface_of_tets
-  use surface_features_m, only: surface_init
+  use surface_features_m, only: surface_init, pair_edges
   use surface_search_m, only: surface_t
   use neighbours_m, only: bins_t, bins_build
   implicit none
@@ -98,14 +98,15 @@ contains
     type(solid_t), intent(inout) :: solid
     real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between coplanar triangles
     real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
+    type(shape_t) :: net                         ! the same surface as facets
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: normal(:, :)
     logical, allocatable :: on_surface(:)
     real(wp) :: p(3, 3), spacing
-    integer :: t, e, i, j, m, n_edges, pass
+    integer :: t, e, i, j, m, pass
     integer(i8) :: total
 
-    allocate (normal(3, size(triangle, 2)), edge(4, 3*size(triangle, 2)))
+    allocate (normal(3, size(triangle, 2)))
     allocate (on_surface(size(shape%point, 2)), source=.false.)
     do t = 1, size(triangle, 2)
       p = solid%face(:, :, t)
@@ -114,7 +115,10 @@ contains
       on_surface(triangle(:, t)) = .true.
     end do
     solid%corner = shape%point(:, pack([(i, i=1, size(on_surface))], on_surface))
-    call surface_edges(triangle, edge, n_edges)
+    net%point = shape%point
+    net%facet = [(3*t + 1, t=0, size(triangle, 2))]
+    net%facet_point = reshape(triangle, [size(triangle)])
+    call pair_edges(net, edge)
     do pass = 1, 2   ! count, then fill
       total = size(solid%corner, 2)
       if (pass == 2) solid%sample(:, :total) = solid%corner
@@ -122,8 +126,9 @@ contains
         total = total + 1
         if (pass == 2) solid%sample(:, total) = centre
       end if
-      do e = 1, n_edges
-        p(:, 1:2) = shape%point(:, edge(1:2, e))
+      do e = 1, size(edge, 2)
+        p(:, 1) = shape%point(:, minval(edge(1:2, e)))
+        p(:, 2) = shape%point(:, maxval(edge(1:2, e)))
         spacing = solid%spacing
         if (edge(4, e) > 0) then
           if (dot_product(normal(:, edge(3, e)), normal(:, edge(4, e))) > 1.0_wp - flat) then
@@ -160,38 +165,6 @@ contains
 
     length = max(norm(p(:, 2) - p(:, 1)), norm(p(:, 3) - p(:, 2)), norm(p(:, 1) - p(:, 3)))
   end function longest_edge
-
-  !> Edges of a closed surface, each once: its two corners and the two triangles at it.
-  pure subroutine surface_edges(triangle, edge, n)
-    integer, intent(in) :: triangle(:, :)   !! (3, triangles)
-    integer, intent(out) :: edge(:, :)      !! (4, :) up to n; second triangle 0 if there is none
-    integer, intent(out) :: n
-    integer, allocatable :: head(:), chain(:)   ! edges by their lower corner
-    integer :: t, c, a, b, e
-
-    allocate (head(maxval(triangle)), chain(size(edge, 2)))
-    head = 0
-    n = 0
-    do t = 1, size(triangle, 2)
-      do c = 1, 3
-        a = min(triangle(c, t), triangle(1 + mod(c, 3), t))
-        b = max(triangle(c, t), triangle(1 + mod(c, 3), t))
-        e = head(a)
-        do while (e > 0)
-          if (edge(2, e) == b .and. edge(4, e) == 0) exit
-          e = chain(e)
-        end do
-        if (e > 0) then
-          edge(4, e) = t
-        else
-          n = n + 1
-          edge(:, n) = [a, b, t, 0]
-          chain(n) = head(a)
-          head(a) = n
-        end if
-      end do
-    end do
-  end subroutine surface_edges
 
   !> Reorder the sample points into clusters with small bounding spheres.
   subroutine cluster_samples(spacing, solid)

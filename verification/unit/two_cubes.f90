@@ -9,10 +9,13 @@ module two_cubes_m
   use shapes_builtin_m, only: make_shape
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t
+  use bed_m, only: bed_counterpart
+  use counterparts_m, only: counterparts_t
   use meeting_m, only: poses_t, meeting_t, update_views
   implicit none
   private
   public :: make_solid, random_poses, moved, meeting_at, distance_from_cube, vector
+  public :: free_bodies
 
 contains
 
@@ -89,5 +92,20 @@ contains
 
     v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
   end function vector
+
+  !> Bodies that do not turn, at rest, as counterparts; contact points of theirs do not harden.
+  pure subroutine free_bodies(mass, counterparts)
+    real(wp), intent(in) :: mass(:)   !! [kg]
+    type(counterparts_t), intent(out) :: counterparts
+    integer :: n
+
+    n = size(mass)
+    allocate (counterparts%v(3, bed_counterpart:n), counterparts%omega(3, bed_counterpart:n), &
+      counterparts%inverse_mass(bed_counterpart:n), &
+      counterparts%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
+    allocate (counterparts%hard(bed_counterpart:n), counterparts%rest_overlap(bed_counterpart:n), &
+      source=1.0_wp)
+    counterparts%inverse_mass(1:n) = 1/mass
+  end subroutine free_bodies
 
 end module two_cubes_m

@@ -12,7 +12,7 @@ module test_contact_forces_m
   use contact_detection_m, only: contact_detection_t
   use contact_forces_m, only: loads_t, contact_report_t, match_displacements, &
     integrate_displacements, sum_forces, elastic_energy
-  use two_cubes_m, only: vector
+  use two_cubes_m, only: vector, free_bodies
   implicit none
   private
   public :: test_contact_forces
@@ -56,21 +56,10 @@ contains
     input%friction = mu
     input%wall_friction = wall_mu
     call choose_law(input, detected%law)
-    associate (counterparts => detected%counterparts)
-      allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
-        source=0.0_wp)
-      allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
-      allocate (counterparts%rest_overlap(bed_counterpart:3), source=1.0_wp)
-      allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
-      allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
-      counterparts%inverse_mass(1:3) = 1/mass
-      do b = 1, 3
-        counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
-      end do
-    end associate
-    allocate (detected%response%frequency2(bed_counterpart:3))
-    allocate (detected%response%stiffness(bed_counterpart:3), &
-      detected%response%damping(bed_counterpart:3))
+    call free_bodies(mass, detected%counterparts)
+    do b = 1, 3
+      detected%counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
+    end do
   end subroutine begin
 
   !> Contact points and displacements as a substep finds them.

@@ -4,14 +4,13 @@ module test_contact_response_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: contact_input_t
-  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use counterparts_m, only: counterparts_t, motion_t, wrench_t, act
   use contact_response_m, only: response_t, respond, highest_frequency2, bound_by_sums, &
     opening_speed, push_apart, impact_turn
-  use two_cubes_m, only: vector
+  use two_cubes_m, only: vector, free_bodies
   implicit none
   private
   public :: test_contact_response
@@ -39,13 +38,7 @@ contains
 
     input%restitution = 0.3_wp
     call choose_law(input, law)
-    allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
-      source=0.0_wp)
-    allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
-    allocate (counterparts%rest_overlap(bed_counterpart:3), source=1.0_wp)
-    allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
-    allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
-    counterparts%inverse_mass(1:3) = 1/mass
+    call free_bodies(mass, counterparts)
     counterparts%v(3, 1) = 1.0e3_wp
     counterparts%v(3, 3) = -1.0e3_wp
   end subroutine make_balls
@@ -68,8 +61,6 @@ contains
     type(response_t) :: response
     real(wp) :: reduced, k, eta
 
-    allocate (response%frequency2(bed_counterpart:3))
-    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     reduced = 1/(1/mass(1) + 1/mass(2))
     k = law%normal_constant(reduced, load_t(), 1.0_wp)
     call add_ball_point(2, 1, [1.0_wp], one)
@@ -94,8 +85,6 @@ contains
     type(response_t) :: response
     real(wp) :: lever   ! change of depth that stands for a shift [-]
 
-    allocate (response%frequency2(bed_counterpart:3))
-    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     call add_ball_point(2, 1, [1.0_wp], points)
     call add_point(contact_point_t(2, 1, 2, normal=[1.0_wp, 0.0_wp, 0.0_wp], depth=depth, &
                            weight=weight, weight_shift=[0.0_wp, growth, 0.0_wp]), points)
@@ -112,8 +101,6 @@ contains
     type(response_t) :: response
     real(wp) :: pair(2), together
 
-    allocate (response%frequency2(bed_counterpart:3))
-    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     call add_ball_point(2, 1, [1.0_wp], points)
     call add_ball_point(3, 2, [1.0_wp], points)
     call respond(points, law, counterparts, response)
@@ -139,8 +126,6 @@ contains
     real(wp) :: frequency2, rate, k, at_2, eta, pair(2)
     integer :: i
 
-    allocate (response%frequency2(bed_counterpart:3))
-    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     do i = 1, 3
       counterparts%inverse_inertia(i, i, 2) = inverse_inertia
     end do
@@ -169,8 +154,6 @@ contains
     type(contact_points_t) :: points
     type(response_t) :: response
 
-    allocate (response%frequency2(bed_counterpart:3))
-    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     counterparts%load = load_t(1.0e9_wp, 1.0e10_wp)
     counterparts%rest_overlap(1) = 1.0e-2_wp
     call add_ball_point(2, 1, [1.0_wp, 0.5_wp], points)
