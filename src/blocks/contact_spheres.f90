@@ -103,12 +103,19 @@ contains
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_spheres_t), intent(inout) :: self
     type(contact_points_t), intent(inout) :: points
+    real(wp) :: v(3), speed
+    logical :: holds
     integer :: p, s, b
 
+    holds = self%listed
     do b = 1, blocks%n
       if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
+      if (holds) holds = blocks%present(b) .eqv. self%present(b)
+      ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
+      if (holds .and. blocks%present(b)) holds = .not. norm(blocks%x(:, b) - self%x(:, b)) &
+        + 2*self%bounding_radius(b)*norm(blocks%q(:, b) - self%q(:, b)) > self%valid_way
     end do
-    if (moved_too_far(self, blocks)) call make_list(walls, blocks, self)
+    if (.not. holds) call make_list(walls, blocks, self)
     do s = 1, self%n_slots
       b = self%body(s)
       associate (c => blocks%shapes(blocks%shape(b))%sphere_centre(:, self%sphere(s)), &
@@ -118,61 +125,27 @@ contains
     end do
     points%n = 0
     do p = 1, self%list%n_pairs
-      if (blocks%still(self%list%a(p))) then
-        if (self%list%b(p) < 0) cycle
-        if (blocks%still(self%list%b(p))) cycle
-      end if
-      if (self%list%b(p) == bed_counterpart) then
-        call add_bed_points(walls%bed, blocks, self, p, way(self, blocks, p, ahead), points)
-      else if (self%list%b(p) < 0) then
-        call add_wall_points(walls, blocks, self, p, way(self, blocks, p, ahead), points)
-      else
-        call add_body_points(blocks, self, p, way(self, blocks, p, ahead), points)
-      end if
+      associate (a => self%list%a(p), c => self%list%b(p))
+        v = blocks%v(:, a)
+        speed = norm(blocks%omega(:, a))*self%bounding_radius(a)   ! of two points, at most
+        if (c < 0) then
+          if (blocks%still(a)) cycle
+        else
+          if (blocks%still(a) .and. blocks%still(c)) cycle
+          v = v - blocks%v(:, c)
+          speed = speed + norm(blocks%omega(:, c))*self%bounding_radius(c)
+        end if
+        speed = speed + norm(v)
+        if (c == bed_counterpart) then
+          call add_bed_points(walls%bed, blocks, self, p, ahead*speed, points)
+        else if (c < 0) then
+          call add_wall_points(walls, blocks, self, p, ahead*speed, points)
+        else
+          call add_body_points(blocks, self, p, ahead*speed, points)
+        end if
+      end associate
     end do
   end subroutine find_sphere_points
-
-  !> The way by which two points of pair p may come nearer within a time [m].
-  pure function way(self, blocks, p, time)
-    type(contact_spheres_t), intent(in) :: self
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: p
-    real(wp), intent(in) :: time   !! [s]
-    real(wp) :: way
-    real(wp) :: v(3)
-    integer :: a, b
-
-    a = self%list%a(p)
-    b = self%list%b(p)
-    v = blocks%v(:, a)
-    way = norm(blocks%omega(:, a))*self%bounding_radius(a)
-    if (b > 0) then
-      v = v - blocks%v(:, b)
-      way = way + norm(blocks%omega(:, b))*self%bounding_radius(b)
-    end if
-    way = time*(way + norm(v))
-  end function way
-
-  !> Whether the list of candidates has to be made anew.
-  pure function moved_too_far(self, blocks) result(yes)
-    type(contact_spheres_t), intent(in) :: self
-    type(blocks_t), intent(in) :: blocks
-    logical :: yes
-    real(wp) :: dx(3), dq(4)
-    integer :: b
-
-    yes = .true.
-    if (.not. self%listed) return
-    do b = 1, blocks%n
-      if (blocks%present(b) .neqv. self%present(b)) return
-      if (.not. blocks%present(b)) cycle
-      dx = blocks%x(:, b) - self%x(:, b)
-      dq = blocks%q(:, b) - self%q(:, b)
-      ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-      if (norm(dx) + 2*self%bounding_radius(b)*norm(dq) > self%valid_way) return
-    end do
-    yes = .false.
-  end function moved_too_far
 
   !> List the sphere pairs that may touch before a body has moved by half the skin.
   subroutine make_list(walls, blocks, self)
