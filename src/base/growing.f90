@@ -3,7 +3,7 @@ module growing_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: ensure_capacity, ensure_rows
+  public :: ensure_capacity
 
   !> Make room for at least n entries in a list, or n columns in an array of them; the entries
   !! present are kept, the new ones are undefined.
@@ -89,18 +89,6 @@ contains
     longer(:size(list)) = list
     call move_alloc(longer, list)
   end subroutine ensure_logicals
-
-  !> Make room for at least n rows in a table, and as many to spare; what was in it is lost.
-  pure subroutine ensure_rows(n, table)
-    integer, intent(in) :: n
-    real(wp), allocatable, intent(inout) :: table(:, :)   !! (rows, columns)
-    integer :: columns
-
-    if (size(table, 1) >= n) return
-    columns = size(table, 2)
-    deallocate (table)
-    allocate (table(2*n, columns))
-  end subroutine ensure_rows
 
   !> Rows of an array of columns: those asked for, else three.
   pure function rows_of(rows) result(n)

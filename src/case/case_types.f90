@@ -20,7 +20,13 @@ module case_types_m
 
   integer, parameter :: max_variants = 5000   !! stones of a family
 
-  type :: run_t
+  !> What the reader knows of a group.
+  type :: group_t
+    integer :: line = 0                             !! of the case file, where it begins
+    logical :: faulty = .false.                     !! its form, place or file is not known
+  end type group_t
+
+  type, extends(group_t) :: run_t
     character(:), allocatable :: title, output
     character(name_length) :: physics = 'coupled'   !! 'coupled', 'fluid', 'dry', 'light'
     real(wp) :: t_end = absent                      !! required [s]
@@ -32,7 +38,6 @@ module case_types_m
     logical :: stop_when_settled = .false.
     real(wp) :: rest_speed = 1.0e-3_wp              !! [m/s]
     real(wp) :: rest_time = 0.5_wp                  !! [s]
-    integer :: line = 0                             !! of the case file, where the group begins
   end type run_t
 
   type :: grid_input_t
@@ -51,7 +56,7 @@ module case_types_m
     logical :: faulty(2, 3) = .false.               !! the kind of this side is not known
   end type boundary_input_t
 
-  type :: fluid_t
+  type, extends(group_t) :: fluid_t
     real(wp) :: liquid_density = 998.2_wp, gas_density = 1.204_wp          !! [kg/m3]
     real(wp) :: liquid_viscosity = 1.002e-3_wp, gas_viscosity = 1.82e-5_wp !! [Pa s]
     real(wp) :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]                    !! [m/s2]
@@ -60,7 +65,6 @@ module case_types_m
     logical :: single_phase = .false.
     real(wp) :: velocity(3) = 0.0_wp                !! uniform initial velocity [m/s]
     character(:), allocatable :: initial_state      !! HDF5 file; '': none
-    integer :: line = 0                             !! of the case file, where the group begins
   end type fluid_t
 
   type :: water_t
@@ -97,7 +101,7 @@ module case_types_m
     logical :: lubrication = .false.
   end type contact_input_t
 
-  type :: shape_input_t
+  type, extends(group_t) :: shape_input_t
     character(name_length) :: name = '', kind = ''  !! required
     real(wp) :: size(3) = absent                    !! required [m]
     real(wp) :: density = 2300.0_wp                 !! [kg/m3]
@@ -112,11 +116,9 @@ module case_types_m
     real(wp) :: mass_min = 0.0_wp, mass_max = 0.0_wp     !! [kg], 0: no bound
     real(wp) :: elongation = 1.5_wp, blockiness = 0.5_wp
     integer :: member = 0                           !! this stone of the family; 0: all, or no rock
-    integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! its form is not known
   end type shape_input_t
 
-  type :: body_input_t
+  type, extends(group_t) :: body_input_t
     character(name_length) :: shape = ''            !! required
     real(wp) :: position(3) = absent                !! required: centre of mass [m]
     !> w, x, y, z, normalised; axis and angle end up here as well.
@@ -128,8 +130,6 @@ module case_types_m
     type(given_motion_t) :: path                    !! of the table
     logical :: attitude_given = .false.             !! by the case itself
     real(wp) :: release_time = 0.0_wp               !! [s]
-    integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! its shape, place or attitude is not known
     logical :: time_faulty = .false.                !! when it is there, or whether it moves
   end type body_input_t
 
@@ -155,7 +155,7 @@ module case_types_m
     real(wp) :: release_height = 0.0_wp             !! [m]
   end type handling_t
 
-  type :: drop_input_t
+  type, extends(group_t) :: drop_input_t
     character(name_length) :: shape = ''            !! required, or one of the next two
     character(name_length) :: shapes(max_drop_shapes) = ''   !! drawn by weight
     character(:), allocatable :: file               !! with a table of places
@@ -173,15 +173,12 @@ module case_types_m
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1
     type(handling_t) :: handling
-    integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! its places or times are not known
   end type drop_input_t
 
-  type :: start_t
+  type, extends(group_t) :: start_t
     character(:), allocatable :: file               !! run.h5 of another run; '': none
     real(wp) :: time = -1.0_wp                      !! of that run [s]; -1: its end
     real(wp) :: shift(3) = 0.0_wp                   !! [m]
-    integer :: line = 0                             !! of the case file, where the group begins
   end type start_t
 
   !> Blocks that begin where another run left them.
@@ -193,11 +190,9 @@ module case_types_m
     real(wp), allocatable :: x(:, :), q(:, :), v(:, :), omega(:, :)   !! (3, n), q (4, n)
   end type begun_t
 
-  type :: bed_input_t
+  type, extends(group_t) :: bed_input_t
     character(:), allocatable :: file
     character(name_length) :: kind = 'heightmap'
-    integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! its file is not known
   end type bed_input_t
 
   type :: case_t

@@ -34,7 +34,6 @@ module mass_average_m
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
-  use growing_m, only: ensure_rows
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms
   implicit none
   private
@@ -306,8 +305,12 @@ contains
 
     accumulator = spread(no_terms, 2, 6*self%bodies%n)
     do b = 1, self%bodies%n
+      n = solid%body_cell(b + 1) - solid%body_cell(b)
+      if (size(self%terms, 1) < n) then
+        deallocate (self%terms)
+        allocate (self%terms(2*n, 6))
+      end if
       n = 0
-      call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), self%terms)
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
           if (any(i < grid%lo) .or. any(i > grid%hi)) cycle

@@ -31,6 +31,7 @@ contains
     character(*), intent(in) :: path
     integer, intent(out) :: code                           !! exit_ok or exit_input
     character(:), allocatable, intent(out) :: message
+    logical :: free
 
     message = ''
     code = exit_ok
@@ -42,8 +43,11 @@ contains
         continue
       else if (.not. exists(path//'/.')) then
         message = what//' = '''//path//''': is a file, must be a folder'
-      else if (.not. is_free(path)) then
-        message = what//' = '''//path//''': the folder is not empty and holds no run.h5, ' &
+      else if (.not. exists(path//'/run.h5')) then
+        free = is_empty(path)
+        if (.not. free) free = exists(path//'/run.h5')   ! a run may just have begun there
+        if (.not. free) message = what//' = '''//path &
+          //''': the folder is not empty and holds no run.h5, ' &
           //'must be new, empty, or that of an older run'
       end if
       if (len(message) > 0) code = exit_input
@@ -218,16 +222,6 @@ contains
 
     yes = c_access(path//c_null_char, 0_c_int) == 0
   end function exists
-
-  !> May a folder be used: empty, or to be renamed away?
-  function is_free(path) result(yes)
-    character(*), intent(in) :: path
-    logical :: yes
-
-    yes = exists(path//'/run.h5')
-    if (.not. yes) yes = is_empty(path)
-    if (.not. yes) yes = exists(path//'/run.h5')   ! a run may just have begun there
-  end function is_free
 
   !> Does a folder hold nothing but itself, its parent and a lock? One that cannot be read counts as
   !! full.

@@ -148,16 +148,24 @@ contains
     type(blocks_t) :: blocks
     integer :: here(left%n)      ! the block of the case that each becomes; 0: none
     logical :: taken(left%n)
-    integer :: i, s, n_there, n_here, b
+    integer :: form(left%n), number(left%n)   ! of each there: shape, among the free ones of it
+    integer, allocatable :: number_here(:)
+    integer :: i, k, s, n_there, n_here, last
 
     call blocks_init(case, shapes, blocks)
     taken = left%free .and. left%released
+    form = [(findloc(shapes%name == left%shape(i), .true., 1), i=1, left%n)]
+    number = [(count(left%free(:i) .and. form(:i) == form(i)), i=1, left%n)]
+    allocate (number_here(blocks%n))
+    do i = 1, blocks%n
+      number_here(i) = count(.not. blocks%fixed(:i) .and. blocks%shape(:i) == blocks%shape(i))
+    end do
     here = 0
     do i = 1, left%n
       if (.not. taken(i)) cycle
       if (any(left%shape(:i - 1) == left%shape(i) .and. taken(:i - 1))) cycle   ! has been looked at
       n_there = count(taken .and. left%shape == left%shape(i))
-      s = findloc(shapes%name == left%shape(i), .true., 1)
+      s = form(i)
       if (s == 0) then
         call report(case, 'has '//to_text(n_there)//' free blocks of the shape ' &
           //quoted_text(trim(left%shape(i)))//', which no &shape here has', problems)
@@ -171,50 +179,22 @@ contains
       end if
       n_here = count(blocks%shape == s .and. .not. blocks%fixed)
       if (n_here == 0) cycle   ! they come along
-      if (last_taken(s) > n_here) then
+      last = maxval(number, taken .and. form == s)
+      if (last > n_here) then
         call report(case, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
-          //' up to number '//to_text(last_taken(s))//', this case names '//to_text(n_here) &
+          //' up to number '//to_text(last)//', this case names '//to_text(n_here) &
           //'; name as many, or none and they come along', problems)
         cycle
       end if
-      call assign(s)
+      do k = 1, left%n   ! the k-th free block of a shape there is the k-th here
+        if (taken(k) .and. form(k) == s) here(k) = findloc(blocks%shape == s .and. .not. &
+          blocks%fixed .and. number_here == number(k), .true., 1)
+      end do
     end do
     if (problems%n > 0) return
     call bring_along(case, left, taken .and. here == 0)
     call keep(case%begun)
   contains
-    !> Number, among the free blocks of a shape there, of the last one that is taken.
-    integer function last_taken(s)
-      integer, intent(in) :: s
-      integer :: k, n
-
-      last_taken = 0
-      n = 0
-      do k = 1, left%n
-        if (left%shape(k) /= shapes(s)%name .or. .not. left%free(k)) cycle
-        n = n + 1
-        if (taken(k)) last_taken = n
-      end do
-    end function last_taken
-
-    !> The k-th free block of a shape there is the k-th here.
-    subroutine assign(s)
-      integer, intent(in) :: s
-      integer :: k
-
-      b = 0
-      do k = 1, left%n
-        if (left%shape(k) /= shapes(s)%name .or. .not. left%free(k)) cycle
-        b = b + 1
-        do while (b <= blocks%n)
-          if (blocks%shape(b) == s .and. .not. blocks%fixed(b)) exit
-          b = b + 1
-        end do
-        if (b > blocks%n) exit
-        if (taken(k)) here(k) = b
-      end do
-    end subroutine assign
-
     !> Remember the blocks that the case names, by drop and number.
     subroutine keep(begun)
       type(begun_t), intent(inout) :: begun
