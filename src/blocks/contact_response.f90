@@ -8,7 +8,7 @@ module contact_response_m
   use displacements_m, only: comes_before
   use contact_law_m, only: contact_law_t, stiffness_t, energy_of_force
   use counterparts_m, only: counterparts_t, inertia_t, motion_t, wrench_t, inertia_of, &
-    inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
+    inverse_effective_mass, motion_between, relative_velocity, act
   implicit none
   private
   public :: response_t, respond, add_frequencies, highest_frequency2, opening_speed, push_apart
@@ -105,6 +105,7 @@ contains
     type(response_t), intent(inout) :: response
     type(couple_t) :: of
     type(stiffness_t) :: elastic
+    type(motion_t) :: motion
     real(wp), parameter :: calm_share = 0.25_wp   !! of the load
     real(wp) :: weights(6), centres(3, 6), nn(6), arm(3)
     real(wp) :: load(3), total, inverse, hard, share, highest, steep, calm, speed
@@ -159,8 +160,9 @@ contains
     call sum_up(points, first, last, steep, of, response)
     highest = steep*highest
     calm = max(counterparts%gravity, calm_share*norm(load)*(of%a%inverse_mass + of%b%inverse_mass))
-    speed = largest_speed(motion_between(counterparts, a, b), points%item(first)%arm_a, &
-      points%item(first)%arm_b)
+    motion = motion_between(counterparts, a, b)
+    speed = norm(motion%v) + norm(motion%omega_a)*norm(points%item(first)%arm_a) &
+      + norm(motion%omega_b)*norm(points%item(first)%arm_b)   ! of points as far out, at most
     if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
     if (of%a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest

@@ -5,7 +5,7 @@ module contact_solver_m
   use growing_m, only: ensure_capacity
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
-  use walls_m, only: walls_t, floor_wall
+  use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use sleep_m, only: sleep_t, sleep_init, sum_memory
@@ -15,7 +15,7 @@ module contact_solver_m
   use substep_limits_m, only: longest_substep_of
   implicit none
   private
-  public :: contact_solver_t, start_solver, met_t, store_counterparts, count_counterparts
+  public :: contact_solver_t, start_solver, met_t, store_counterparts
 
   !> Pairs that touched, sorted.
   type :: met_t
@@ -158,22 +158,5 @@ contains
       met%n = met%n + 1
     end do
   end subroutine store_counterparts
-
-  !> Number of counterparts each body met in this step, and whether the floor was one of them.
-  pure subroutine count_counterparts(met, blocks)
-    type(met_t), intent(in) :: met
-    type(blocks_t), intent(inout) :: blocks
-    integer :: m, a, b
-
-    blocks%contacts = 0
-    blocks%on_floor = 0
-    do m = 1, met%n
-      a = met%a(m)
-      b = met%b(m)
-      blocks%contacts(a) = blocks%contacts(a) + 1
-      if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
-      if (b == floor_wall .or. b == bed_counterpart) blocks%on_floor(a) = 1
-    end do
-  end subroutine count_counterparts
 
 end module contact_solver_m

@@ -129,7 +129,17 @@ contains
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
-    call renew_moving(blocks, self)
+    if (.not. self%moving_listed .or. any(self%state /= state_of(blocks%still, blocks%fixed))) then
+      self%state = state_of(blocks%still, blocks%fixed)
+      call ensure_capacity(self%near%n, self%moving)
+      self%n_moving = 0
+      do p = 1, self%near%n
+        if (iand(self%state(self%near%a(p)), self%state(self%near%b(p))) /= 0) cycle
+        self%n_moving = self%n_moving + 1
+        self%moving(self%n_moving) = p
+      end do
+      self%moving_listed = .true.
+    end if
     points%n = 0
     p = 1
     do a = 1, blocks%n
@@ -167,24 +177,6 @@ contains
     end do
     if (.not. holds) call list_pairs(walls, blocks, self)
   end subroutine renew_pairs
-
-  !> List the pairs that can touch anew where the list no longer holds.
-  pure subroutine renew_moving(blocks, self)
-    type(blocks_t), intent(in) :: blocks
-    type(contact_surface_t), intent(inout) :: self
-    integer :: p
-
-    if (self%moving_listed .and. all(self%state == state_of(blocks%still, blocks%fixed))) return
-    self%state = state_of(blocks%still, blocks%fixed)
-    call ensure_capacity(self%near%n, self%moving)
-    self%n_moving = 0
-    do p = 1, self%near%n
-      if (iand(self%state(self%near%a(p)), self%state(self%near%b(p))) /= 0) cycle
-      self%n_moving = self%n_moving + 1
-      self%moving(self%n_moving) = p
-    end do
-    self%moving_listed = .true.
-  end subroutine renew_moving
 
   !> Bit 0: still, bit 1: fixed. Two bodies with a bit in common cannot touch.
   elemental integer function state_of(still, fixed)
@@ -303,6 +295,7 @@ contains
     type(contact_surface_t), intent(inout) :: self
     type(contact_points_t), intent(inout) :: points
     type(meeting_t) :: now
+    real(wp) :: apart, depth, normal(3), arm(3)
     integer :: a, b
 
     a = self%pairs(p)%a
@@ -323,7 +316,13 @@ contains
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
-        call add_ball_point(now, surface_a, surface_b, self%pairs(p), points)
+        apart = norm(now%to_b)
+        depth = surface_a%ball + surface_b%ball - apart
+        if (depth <= -now%gap) return
+        normal = now%to_b/max(apart, tiny(1.0_wp))
+        arm = (surface_a%ball - 0.5_wp*depth)*normal
+        call add_point(contact_point_t(a, b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
+          min(surface_a%length, surface_b%length)), points)
       else
         call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(p), points)
       end if
@@ -366,23 +365,6 @@ contains
     call add_vertex_points(.true., now, surface_a, surface_b, pair, points)
     call add_edge_points(now, surface_a, surface_b, pair, points)
   end subroutine add_feature_points
-
-  !> The one contact point of two spheres.
-  subroutine add_ball_point(now, surface_a, surface_b, pair, points)
-    type(meeting_t), intent(in) :: now
-    type(surface_t), intent(in) :: surface_a, surface_b
-    type(pair_t), intent(in) :: pair
-    type(contact_points_t), intent(inout) :: points
-    real(wp) :: apart, depth, normal(3), arm(3)
-
-    apart = norm(now%to_b)
-    depth = surface_a%ball + surface_b%ball - apart
-    if (depth <= -now%gap) return
-    normal = now%to_b/max(apart, tiny(1.0_wp))
-    arm = (surface_a%ball - 0.5_wp*depth)*normal
-    call add_point(contact_point_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
-      min(surface_a%length, surface_b%length)), points)
-  end subroutine add_ball_point
 
   !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
   !! (the host).

@@ -4,11 +4,12 @@ module contacts_m
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t, begin_step, hold_sleepers, look_ahead, follow_motions, &
     fastest_point
-  use walls_m, only: walls_t
+  use walls_m, only: walls_t, floor_wall
+  use bed_m, only: bed_counterpart
   use sleep_m, only: update_stillness, store_quiet, all_still
   use counterparts_m, only: update_counterparts
   use contact_forces_m, only: contact_report_t
-  use contact_solver_m, only: contact_solver_t, count_counterparts
+  use contact_solver_m, only: contact_solver_t
   use resting_m, only: wake_or_sleep, restore_contacts
   use springs_m, only: springs_t
   use impulse_step_m, only: impulses_t
@@ -102,7 +103,7 @@ contains
     real(wp), intent(in) :: gravity(3), dt   !! [m/s2], fluid step [s]
     class(contact_solver_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
-    integer :: b
+    integer :: b, m
 
     do b = 1, blocks%n   ! at which the free bodies end their motion
       blocks%speed(b) = 0.0_wp
@@ -113,7 +114,15 @@ contains
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
-    call count_counterparts(contacts%met, blocks)
+    blocks%contacts = 0
+    blocks%on_floor = 0
+    do m = 1, contacts%met%n
+      associate (a => contacts%met%a(m), c => contacts%met%b(m))
+        blocks%contacts(a) = blocks%contacts(a) + 1
+        if (c > 0) blocks%contacts(c) = blocks%contacts(c) + 1
+        if (c == floor_wall .or. c == bed_counterpart) blocks%on_floor(a) = 1
+      end associate
+    end do
   end subroutine finish
 
 end module contacts_m

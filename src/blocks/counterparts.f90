@@ -12,7 +12,7 @@ module counterparts_m
   public :: counterparts_t, inertia_t, motion_t, wrench_t
   public :: counterparts_init, update_counterparts, update_motion, update_inertia
   public :: inertia_of, inverse_effective_mass, act
-  public :: motion_between, relative_velocity, largest_speed
+  public :: motion_between, relative_velocity
 
   !> What may touch: bodies (1..n), walls (-6..-1) and the bed (`bed_counterpart`) alike.
   type :: counterparts_t
@@ -162,15 +162,6 @@ contains
 
     v = motion%v + (cross(motion%omega_b, arm_b) - cross(motion%omega_a, arm_a))
   end function relative_velocity
-
-  !> Highest speed against one another of points of two bodies as far out as a contact [m/s].
-  pure function largest_speed(motion, arm_a, arm_b) result(speed)
-    type(motion_t), intent(in) :: motion
-    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
-    real(wp) :: speed
-
-    speed = norm(motion%v) + norm(motion%omega_a)*norm(arm_a) + norm(motion%omega_b)*norm(arm_b)
-  end function largest_speed
 
   !> Add a force on body a at a contact, and its reaction on counterpart b.
   pure subroutine act(f, arm_a, arm_b, wrench)

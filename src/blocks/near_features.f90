@@ -190,20 +190,29 @@ contains
     list%edge_first(list%n + 1) = list%n_edges + 1
   end subroutine end_lists
 
-  !> Append those of some facets that are within the cutoff of a place to a list of n numbers.
+  !> Append those of some facets that may be nearest to a place, within the cutoff of it, to a list
+  !! of n numbers.
   subroutine append_facets(host, facets, place, cutoff, n, list)
     type(surface_t), intent(in) :: host
     integer, intent(in) :: facets(:)
     real(wp), intent(in) :: place(3), cutoff   !! host axes [m]
     integer, intent(inout) :: n
     integer, allocatable, intent(inout) :: list(:)
-    integer :: k
+    logical :: near
+    integer :: k, c
 
     call ensure_capacity(n + size(facets), list)
     do k = 1, size(facets)
-      if (.not. facet_is_near(host, facets(k), place, cutoff)) cycle
-      n = n + 1
-      list(n) = facets(k)
+      associate (f => facets(k))
+        near = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= cutoff
+        do c = host%side(f), host%side(f + 1) - 1
+          if (.not. near) exit
+          near = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - cutoff
+        end do
+        if (.not. near) cycle
+        n = n + 1
+        list(n) = f
+      end associate
     end do
   end subroutine append_facets
 
@@ -228,22 +237,6 @@ contains
       list(n) = edges(k)
     end do
   end subroutine append_edges
-
-  !> Whether a facet may be the nearest to a place, within the cutoff of it.
-  pure function facet_is_near(host, f, place, cutoff) result(yes)
-    type(surface_t), intent(in) :: host
-    integer, intent(in) :: f
-    real(wp), intent(in) :: place(3), cutoff   !! body axes [m]
-    logical :: yes
-    integer :: c
-
-    yes = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= cutoff
-    if (.not. yes) return
-    do c = host%side(f), host%side(f + 1) - 1
-      yes = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - cutoff
-      if (.not. yes) return
-    end do
-  end function facet_is_near
 
   !> Pairs of convex edges that may cross before the bodies have moved by the skin.
   subroutine list_crossings(a_in_b, surface_a, surface_b, search, near)
