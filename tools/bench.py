@@ -43,11 +43,7 @@ def main() -> None:
     add("--program", type=Path, default=ROOT / "mics", help="mics_mpi is taken from its folder")
     given = parser.parse_args()
     program = given.program.resolve()
-    means = parts.Means(
-        (program, program.with_name("mics_mpi")),
-        given.repeat,
-        given.threads,
-    )
+    means = parts.Means((program, program.with_name("mics_mpi")), given.repeat, given.threads)
     old = table.read(given.against) if given.against else None
     found = {
         "version": parts.version(program),

@@ -24,8 +24,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from micstools import command  # noqa: E402
-from micstools.bench.dry_pile import case, measure  # noqa: E402
-from micstools.bench.timing import timed  # noqa: E402
+from micstools.bench import jobs  # noqa: E402
+from micstools.bench.dry_pile import measure  # noqa: E402
 from micstools.reading.reader import Run  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,19 +46,14 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1, help="depth at every so many late rows")
     parser.add_argument("--program", type=Path, default=ROOT / "mics")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        output = Path(folder) / "run"
-        path = Path(folder) / "pile.nml"
-        path.write_text(
-            case(given.n, output, given.time, given.dt, given.contact_time, given.sleep,
-                 given.box, given.seed, given.solver)
-        )  # fmt: skip
-        words = [given.program.resolve(), "--quiet", "--threads", str(given.threads), path]
-        wall, cpu, memory, _ = timed(words, Path.cwd())
-        run = Run(output)
-        steps = int(run.series.substeps.sum())
+    kept = ("dt", "contact_time", "sleep", "box", "seed", "solver")
+    case = {name: getattr(given, name) for name in kept}
+    with tempfile.TemporaryDirectory() as name:
+        program, folder = given.program.resolve(), Path(name)
+        took = jobs.pile(given.n, given.time, program, given.threads, folder, **case)
+        run = Run(folder / "result")
+        steps = took.steps
         found = {
-            "peer": "mics",
             "version": str(run.provenance.get("version", "")),
             "n_blocks": given.n,
             "box": given.box,
@@ -70,12 +65,12 @@ def main() -> None:
             "sleep": given.sleep,
             "steps": steps,
             "threads": given.threads,
-            "wall_s": wall,
-            "cpu_s": cpu,
-            "memory_mb": memory / 1e6,
-            "wall_per_block_step": wall / (given.n * steps),
-            "cpu_per_block_step": cpu / (given.n * steps),
-            "wall_per_sim_s": wall / given.time,
+            "wall_s": took.wall,
+            "cpu_s": took.cpu,
+            "memory_mb": took.memory / 1e6,
+            "wall_per_block_step": took.wall / (given.n * steps),
+            "cpu_per_block_step": took.cpu / (given.n * steps),
+            "wall_per_sim_s": took.wall / given.time,
             **measure(run, given.box, given.every),
         }
     rounded = {k: float(f"{v:.5g}") if isinstance(v, float) else v for k, v in found.items()}

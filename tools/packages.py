@@ -6,6 +6,7 @@ no files use one another in a circle.
 """
 
 import re
+import tomllib
 from collections import Counter
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -16,21 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 TOP = "top"
-LAYERS = (
-    ("base",),
-    ("case",),
-    ("grid", "shapes"),
-    ("solvers", "blocks"),
-    ("liquid", "pressure", "light"),
-    ("walls",),
-    ("momentum",),
-    ("coupling",),
-    ("output",),
-    ("setup",),
-    (TOP,),
-)
-"""From the lowest to the highest."""
-HEIGHT = {package: height for height, layer in enumerate(LAYERS) for package in layer}
+DATA = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
+HEIGHT = {package: height for height, layer in enumerate(DATA["layers"]) for package in layer}
 
 MODULE = re.compile(r"^\s*(?:module|program)\s+(\w+)\s*$", re.MULTILINE | re.IGNORECASE)
 USE = re.compile(
@@ -66,7 +54,7 @@ def package_of(file: str) -> str:
 def faults(found: Imports) -> list[str]:
     """What is against the order of the packages, a line each, and the first circle among files."""
     lines = [
-        f"{package}: no such package in LAYERS"
+        f"{package}: no such package in packages.toml"
         for package in sorted(_packages(found) - HEIGHT.keys())
     ]
     for file, used in sorted(found.items()):
@@ -95,80 +83,7 @@ def _packages(found: Imports) -> set[str]:
     return {package_of(file) for file in found}
 
 
-# The picture: the flow on the left, the blocks on the right, what joins them above. All packages
-# use `base`, nearly all `case`, and `setup` and `top` use nearly all: these four are bands that
-# tell their counts in words. Boxes: middle x, height, width.
-BANDS = {"base": 0.0, "case": 1.0, "setup": 8.75, TOP: 9.75}
-BOXES = {
-    "grid": (4.8, 2.2, 7.6),
-    "shapes": (10.65, 2.2, 3.3),
-    "solvers": (5.0, 3.35, 2.0),
-    "blocks": (10.6, 3.35, 2.0),
-    "liquid": (2.55, 4.5, 2.0),
-    "pressure": (6.1, 4.5, 2.0),
-    "walls": (5.75, 5.55, 2.0),
-    "momentum": (2.1, 6.55, 2.0),
-    "coupling": (7.4, 7.5, 2.0),
-    "light": (10.9, 5.4, 1.7),
-    "output": (11.2, 7.6, 2.2),
-}
-ENDS = {
-    ("blocks", "shapes"): (10.6, 10.6),
-    ("coupling", "blocks"): (8.1, 9.85),
-    ("coupling", "grid"): (7.75, 7.75),
-    ("coupling", "liquid"): (6.6, 3.1),
-    ("coupling", "momentum"): (6.45, 3.05),
-    ("coupling", "pressure"): (7.2, 6.75),
-    ("coupling", "shapes"): (7.95, 9.3),
-    ("coupling", "walls"): (6.9, 6.3),
-    ("liquid", "grid"): (2.55, 2.55),
-    ("momentum", "grid"): (1.28, 1.28),
-    ("momentum", "liquid"): (1.9, 2.1),
-    ("momentum", "pressure"): (3.0, 5.3),
-    ("momentum", "solvers"): (2.7, 4.2),
-    ("momentum", "walls"): (3.08, 5.0),
-    ("light", "blocks"): (10.7, 10.7),
-    ("light", "shapes"): (11.7, 11.75),
-    ("output", "blocks"): (10.2, 9.8),
-    ("output", "light"): (10.9, 10.9),
-    ("output", "grid"): (10.3, 8.3),
-    ("output", "shapes"): (12.1, 12.1),
-    ("pressure", "grid"): (6.6, 6.6),
-    ("pressure", "solvers"): (5.55, 5.55),
-    ("solvers", "grid"): (5.0, 5.0),
-    ("walls", "grid"): (4.9, 3.05),
-    ("walls", "liquid"): (4.8, 3.3),
-    ("walls", "pressure"): (6.0, 6.1),
-}
-"""Where an arrow leaves the user and reaches the used (x); else it joins the middles."""
-CONTENT = {
-    "base": "kinds, vectors, exact sums, processes",
-    "case": "the case file",
-    "grid": "cells, sides of the tank, what solids leave open",
-    "shapes": "forms, surfaces, the bed",
-    "solvers": "Krylov, multigrid",
-    "blocks": "motion, contact",
-    "liquid": "surface and transport",
-    "pressure": "C-HSMAC",
-    "walls": "cut cells, wall layer, balance",
-    "momentum": "transport, viscosity, tension",
-    "coupling": "shares, forces, one solve",
-    "light": "a given water",
-    "output": "results, restart",
-    "setup": "checks and plan of a case, start from a file",
-    TOP: "the program and its time step",
-}
-COLOURS = {
-    "blocks": "#8c510a",
-    "coupling": "#1b7837",
-    "light": "#1b7837",
-    "output": "#762a83",
-    "momentum": "#2166ac",
-    "walls": "#2166ac",
-    "liquid": "#4393c3",
-    "pressure": "#4393c3",
-    "solvers": "#4393c3",
-}
+BANDS, BOXES, CONTENT, COLOURS = (DATA[name] for name in ("bands", "boxes", "content", "colours"))
 GREY = "#555555"
 TALL = 0.58
 ALONG = 0.42  # of an arrow is before its count
@@ -224,7 +139,7 @@ def _say(axis: Axes, x: float, y: float, words: str, **style: Any) -> None:
 
 def _arrow(axis: Axes, user: str, used: str, n: int) -> None:
     """From the lower edge of the user to the upper edge of the used, with the count on it."""
-    x_start, x_end = ENDS.get((user, used), (BOXES[user][0], BOXES[used][0]))
+    x_start, x_end = DATA["ends"].get(user, {}).get(used, (BOXES[user][0], BOXES[used][0]))
     start = (x_start, BOXES[user][1] - TALL / 2)
     end = (x_end, BOXES[used][1] + TALL / 2)
     colour = COLOURS.get(user, GREY)

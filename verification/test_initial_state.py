@@ -53,11 +53,7 @@ def test_state_is_taken(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_state_is_refused(
-    liquid: np.ndarray | None,
-    velocity: np.ndarray | None,
-    more: str,
-    message: str,
-    tmp_path: Path,
+    liquid: np.ndarray | None, velocity: np.ndarray | None, more: str, message: str, tmp_path: Path
 ) -> None:
     """Exit code 2, the reason and the line of the group."""
     write_initial_state(tmp_path / "state.h5", liquid, velocity)

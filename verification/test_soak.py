@@ -6,15 +6,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import (
-    any_number,
-    full_disk,
-    memory,
-    moved_folders,
-    signals,
-    still_pile,
-    two_programs,
-)
+from soak import any_number, full_disk, memory, moved_folders, signals, still_pile, two_programs
 from soak.shop import Shop, open_shop
 
 MICS, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"

@@ -11,6 +11,7 @@ import argparse
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -32,6 +33,7 @@ from run_cases import (
     judge,
     names,
     planned,
+    run,
 )
 
 OUT = ROOT / "build" / "verify"
@@ -135,7 +137,7 @@ def compute(plan: Planned, key: str, progress: Progress) -> Finished:
     if before and newest:
         where = ["--restart", str(newest[0])]
     else:
-        subprocess.run(["rm", "-rf", str(folder)], check=True)
+        shutil.rmtree(folder, ignore_errors=True)
         where = ["--output", str(folder)]
     case = plan.write(folder.parent)
     note.write_text(json.dumps({"key": key, **asdict(finished)}))
@@ -212,13 +214,7 @@ def defaults() -> Run:
         "&shape name = 'ball'  kind = 'sphere'  size = 0.1 /\n"
         "&body shape = 'ball'  position = 0.5, 0.5, 0.5 /\n"
     )
-    subprocess.run(["rm", "-rf", str(OUT / "defaults")], check=True)
-    subprocess.run(
-        [*Machine(threads=1).command, "--output", str(OUT / "defaults"), str(case)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        check=True,
-    )
+    run(case, OUT / "defaults", Machine(threads=1))
     return Run(OUT / "defaults")
 
 

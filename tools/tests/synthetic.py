@@ -296,12 +296,7 @@ def _fluid(motion: Motion, t: float, position: Array, quaternion: Array) -> dict
         solid[(legs[1] < 0.01) & (legs[2] < 0.03)] = 1.0
     speed = 0.15 * np.sin(14 * t) * np.exp((z - height) / 0.05)
     velocity = np.stack(
-        [
-            speed * np.sin(2 * np.pi * x / 0.3),
-            0 * x,
-            speed * np.cos(2 * np.pi * x / 0.3),
-        ],
-        axis=-1,
+        [speed * np.sin(2 * np.pi * x / 0.3), 0 * x, speed * np.cos(2 * np.pi * x / 0.3)], axis=-1
     )
     return {
         "liquid": liquid,

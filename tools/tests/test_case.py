@@ -114,7 +114,7 @@ def test_a_case_is_shown(case: Case) -> None:
     assert repr(case).startswith("Case it's a / b & c\n  &run title, t_end")
     assert repr(case.drop[1]) == "drop(shape='cube', position=[0.15, 0.1, 0.03], first_time=0.1)"
     shown = case._repr_html_()
-    assert shown.startswith("<table>") and "it&#x27;s a / b &amp; c" in shown
+    assert "<table>" in shown and "it&#x27;s a / b &amp; c" in shown
     assert "<b>seed</b>" in case.drop[0]._repr_html_() and "&amp;drop" in case.drop._repr_html_()
 
 

@@ -28,11 +28,7 @@ has_ffprobe = pytest.mark.skipif(not movie.shutil.which("ffprobe"), reason="no f
 
 @pytest.mark.parametrize(
     ("slow", "caption"),
-    [
-        (1, "t = 2.50 s"),
-        (4, "t = 2.50 s, 4 times slower"),
-        (0.04, "t = 2.50 s, 25 times faster"),
-    ],
+    [(1, "t = 2.50 s"), (4, "t = 2.50 s, 4 times slower"), (0.04, "t = 2.50 s, 25 times faster")],
 )
 def test_caption(slow: float, caption: str) -> None:
     assert Film(slow=slow).caption(2.5) == caption

@@ -28,11 +28,7 @@ def test_uses_are_found_and_counted(tmp_path: Path) -> None:
     found = packages.imports(source)
     assert found["step.f90"] == {"base/kinds.f90", "grid/grid.f90"}
     assert found["grid/grid.f90"] == {"base/kinds.f90"}
-    assert packages.arrows(found) == {
-        ("top", "base"): 1,
-        ("top", "grid"): 1,
-        ("grid", "base"): 1,
-    }
+    assert packages.arrows(found) == {("top", "base"): 1, ("top", "grid"): 1, ("grid", "base"): 1}
     assert packages.faults(found) == []
 
 
@@ -65,7 +61,7 @@ def test_a_circle_is_named(tmp_path: Path) -> None:
 
 def test_a_package_without_a_layer_is_named(tmp_path: Path) -> None:
     source = write(tmp_path, waves__maker="")
-    assert packages.faults(packages.imports(source)) == ["waves: no such package in LAYERS"]
+    assert packages.faults(packages.imports(source)) == ["waves: no such package in packages.toml"]
 
 
 def test_the_picture_shows_every_package() -> None:

@@ -45,11 +45,7 @@ class Check:
 CHECKS = (
     Check("debug", (str(ROOT / "mics_debug"),), 100_000),
     Check("san", (str(ROOT / "mics_san"),), 50_000),
-    Check(
-        "valgrind",
-        ("valgrind", "-q", "--error-exitcode=99", str(ROOT / "mics_debug")),
-        10_000,
-    ),
+    Check("valgrind", ("valgrind", "-q", "--error-exitcode=99", str(ROOT / "mics_debug")), 10_000),
 )
 
 

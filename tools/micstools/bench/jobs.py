@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:
     path.write_text(job.text)
     program = [*mpirun(job.ranks), programs[job.ranks > 1]]
     words = [*program, "--quiet", "--threads", job.threads, "--output", output, path]
-    wall, cpu, memory, _ = timed(words, folder, excused=NO_ROOM)
+    wall, cpu, memory = timed(words, folder, excused=NO_ROOM)
     found = Run(output)
     seconds = {k: v for k, (v, _) in found.timers.items() if k not in _NOT_STEPPING}
     stepping = sum(seconds.values())
@@ -93,12 +94,12 @@ def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:
     )
 
 
-def pile(n: int, seconds: float, program: Path, threads: int, folder: Path) -> Timing:
+def pile(n: int, seconds: float, program: Path, threads: int, folder: Path, **case: Any) -> Timing:
     """Run the dry pile of n blocks; a step is one of contact, the size that of the pile."""
     path, output = folder / "pile.nml", folder / "result"
-    path.write_text(dry_pile.case(n, output, seconds))
+    path.write_text(dry_pile.case(n, output, seconds, **case))
     words = [program, "--quiet", "--threads", threads, path]
-    wall, cpu, memory, _ = timed(words, folder)
+    wall, cpu, memory = timed(words, folder)
     return Timing(wall, cpu, memory, seconds, int(Run(output).series.substeps.sum()), n)
 
 

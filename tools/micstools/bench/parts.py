@@ -13,7 +13,7 @@ from micstools.bench.jobs import Job
 from micstools.bench.timing import Timing
 
 Row = dict[str, Any]
-KEYS = ("part", "job", "by", "threads", "ranks", "size")
+KEYS = ("part", "job", "threads", "ranks", "size")
 """What tells rows apart."""
 PILE = 64  # blocks
 PILE_SECONDS = 2.0
@@ -85,9 +85,7 @@ def _fresh(work: Callable[[Path], Any]) -> Any:
         return work(Path(folder))
 
 
-def row(
-    part: str, job: str, runs: list[Timing], by: str = "mics", threads: int = 1, ranks: int = 1
-) -> Row:
+def row(part: str, job: str, runs: list[Timing], threads: int = 1, ranks: int = 1) -> Row:
     """The fastest of some runs, and by how much the slowest took longer."""
     best = min(runs, key=lambda run: run.wall)
     numbers = {
@@ -101,7 +99,7 @@ def row(
         "memory_each": best.memory / best.size,
     }
     known = {k: float(f"{v:.4g}") for k, v in numbers.items() if v == v}
-    about = {"part": part, "job": job, "by": by, "threads": threads, "ranks": ranks}
+    about = {"part": part, "job": job, "threads": threads, "ranks": ranks}
     shares = {"phases": {k: round(v, 4) for k, v in best.phases.items()}} if best.phases else {}
     return about | {"size": best.size, "steps": best.steps} | known | shares
 

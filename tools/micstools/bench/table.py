@@ -8,7 +8,7 @@ from micstools.bench.parts import KEYS, Row
 from micstools.reading.reader import BadRun
 
 HEAD = (
-    f"{'part':9}{'job':12}{'by':16}{'crew':>6}{'size':>9}{'steps':>7}{'wall s':>10}{'CPU s':>10}"
+    f"{'part':9}{'job':12}{'crew':>6}{'size':>9}{'steps':>7}{'wall s':>10}{'CPU s':>10}"
     f"{'slowest':>9}  "
 )
 
@@ -16,10 +16,9 @@ HEAD = (
 def line(row: Row) -> str:
     """One row."""
     crew = f"{row['threads']}t" if row["ranks"] == 1 else f"{row['ranks']}r"
-    steps = row.get("steps", row.get("iterations", 0))
     spread = f"{row['spread']:+.0%}" if "spread" in row else ""
     return (
-        f"{row['part']:9}{row['job']:12}{row['by']:16}{crew:>6}{row['size']:9}{steps:7}"
+        f"{row['part']:9}{row['job']:12}{crew:>6}{row['size']:9}{row['steps']:7}"
         f"{row['wall']:10.4g}{row['cpu']:10.4g}{spread:>9}  {_more(row)}"
     )
 
@@ -63,11 +62,10 @@ def beside(new: dict[str, Any], old: dict[str, Any]) -> str:
     before = _by_key(old["rows"])
     for key, row in _by_key(new["rows"]).items():
         if key not in before:
-            lines.append(f"{line(row)[:59]} new")
+            lines.append(f"{line(row)[:43]} new")
             continue
         was = before.pop(key)
-        counts = [k for k in ("steps", "iterations") if k in row]
-        ratios = [f"{k} {row[k] / was[k]:.2f}" for k in ("wall", "cpu", *counts) if was.get(k)]
-        lines.append(f"{line(row)[:59]} {', '.join(ratios)}")
-    lines += [f"{line(row)[:59]} not in this one" for row in before.values()]
+        ratios = [f"{k} {row[k] / was[k]:.2f}" for k in ("wall", "cpu", "steps") if was.get(k)]
+        lines.append(f"{line(row)[:43]} {', '.join(ratios)}")
+    lines += [f"{line(row)[:43]} not in this one" for row in before.values()]
     return "\n".join(lines)

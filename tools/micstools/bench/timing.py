@@ -36,20 +36,17 @@ def mpirun(ranks: int) -> list[str]:
 
 
 def timed(
-    words: Sequence[object],
-    folder: Path,
-    settings: dict[str, str] | None = None,
-    excused: str | None = None,
-) -> tuple[float, float, float, str]:
-    """Run a program, with `settings` in its environment: wall and CPU seconds, its own and its
-    children's, largest memory of one of them [bytes], and what it said. An exit code
-    other than 0 is an error, unless the program says what is `excused`."""
+    words: Sequence[object], folder: Path, excused: str | None = None
+) -> tuple[float, float, float]:
+    """Run a program: wall and CPU seconds, its own and its children's, and largest memory of one of
+    them [bytes]. An exit code other than 0 is an error, unless the program says what is
+    `excused`."""
     with tempfile.TemporaryFile("w+") as said:
         began = time.perf_counter()
         running = subprocess.Popen(
             [str(word) for word in words],
             cwd=folder,
-            env={**os.environ, **AS_ROOT, **(settings or {})},
+            env=os.environ | AS_ROOT,
             stdout=said,
             stderr=said,
         )
@@ -62,7 +59,7 @@ def timed(
         last = text.strip().splitlines()[-1:] or ["nothing said"]
         raise subprocess.SubprocessError(f"{words[0]} ended with {running.returncode}: {last[0]}")
     unit = 1 if sys.platform == "darwin" else 1024
-    return wall, used.ru_utime + used.ru_stime, float(unit * used.ru_maxrss), text
+    return wall, used.ru_utime + used.ru_stime, float(unit * used.ru_maxrss)
 
 
 def processor() -> str:

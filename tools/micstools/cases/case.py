@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from micstools import files
 from micstools.cases import case_copy, program, settings
+from micstools.pages.html import table, tag
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.schema import schema, variables
 
@@ -108,11 +109,11 @@ class Group:
     def _repr_html_(self) -> str:
         """All variables: what is given, the default and the meaning."""
         rows = [
-            (f"<b>{name}</b>" if name in self.given else name, repr(self.given.get(name, "")),
-             repr(about.get("default", "")), about["description"])
+            [tag("b", name) if name in self.given else name, repr(self.given.get(name, "")),
+             repr(about.get("default", "")), about["description"]]
             for name, about in variables(self._group).items()
         ]  # fmt: skip
-        return _table(("variable", "given", "default", "meaning"), rows)
+        return table(["variable", "given", "default", "meaning"], rows, numbers=False)
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.given == getattr(other, "given", None)
@@ -162,7 +163,7 @@ class Groups(list[Group]):
         """A row per group, of the variables that one of them gives."""
         names = list(dict.fromkeys(name for group in self for name in group.given))
         rows = [[k, *(repr(g.given.get(name, "")) for name in names)] for k, g in enumerate(self)]
-        return _table((f"&{self.name}", *names), rows)
+        return table([f"&{self.name}", *names], rows, numbers=False)
 
 
 class Case:
@@ -302,31 +303,17 @@ class Case:
 
     def _repr_html_(self) -> str:
         """The groups with what they give."""
-        rows = [
-            (f"&{name}", ", ".join(f"{key} = {value!r}" for key, value in group.given.items()))
+        rows: list[list[object]] = [
+            [f"&{name}", ", ".join(f"{key} = {value!r}" for key, value in group.given.items())]
             for name, found in self._groups.items()
             for group in _all(found)
             if group.given
         ]
-        return _table((str(self.run.title).strip() or "case", "given"), rows)
+        return table([str(self.run.title).strip() or "case", "given"], rows, numbers=False)
 
 
 def _all(found: Group | Groups) -> Sequence[Group]:
     return found if isinstance(found, Groups) else [found]
-
-
-def _table(heads: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
-    """A table for a notebook; heads and cells in <b> stay, all else is escaped."""
-
-    def cell(value: object) -> str:
-        text = str(value)
-        if text.startswith("<b>"):
-            return f"<b>{html.escape(text[3:-4])}</b>"
-        return html.escape(text)
-
-    head = "".join(f"<th>{html.escape(str(h))}</th>" for h in heads)
-    body = "".join(f"<tr>{''.join(f'<td>{cell(v)}</td>' for v in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 class PlanText(str):

@@ -93,9 +93,7 @@ def _disc_area(x: Array, y: Array, radius: float) -> Array:
         x > half, _half_disc(x, radius) - _half_disc(np.minimum(half, x), radius), 0.0
     )
     inside = np.where(
-        x > -half,
-        _half_disc(right, radius) - _half_disc(-half, radius) + y * (right + half),
-        0.0,
+        x > -half, _half_disc(right, radius) - _half_disc(-half, radius) + y * (right + half), 0.0
     )
     return np.where(y >= 0.0, 2.0 * outside, 0.0) + inside
 

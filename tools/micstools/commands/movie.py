@@ -54,10 +54,7 @@ MOVIE = Command(
     "movie",
     "Make a film of a run, mp4 or gif. The water is that of the nearest written\n"
     "field: a small &run field_interval makes it flow.",
-    (
-        "movie mics-coarse",
-        "movie mics-coarse --view orbit --slow 2 --out fall.gif --width 480",
-    ),
+    ("movie mics-coarse", "movie mics-coarse --view orbit --slow 2 --out fall.gif --width 480"),
     _arguments,
     _movie,
 )

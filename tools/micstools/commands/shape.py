@@ -24,10 +24,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     edge = "longest edge [file's units, of STEP mm]"
     parser.add_argument("--element", type=float, default=0.0, help=edge)
     parser.add_argument(
-        "--simplify",
-        type=int,
-        metavar="FACES",
-        help="most triangles of a fine surface",
+        "--simplify", type=int, metavar="FACES", help="most triangles of a fine surface"
     )
     parser.add_argument("--density", type=float, default=2300.0, help="[kg/m3]")
     parser.add_argument("--out", type=Path, required=True, help="shape file to write")

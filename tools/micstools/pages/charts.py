@@ -78,8 +78,7 @@ def lines(curves: list[Curve], x: str, y: str, *, limit: float | None = None,
     moves with the player."""
     shown = [c.y for c in curves] + ([np.array([limit])] if limit is not None else [])
     axes = Axes(
-        _bounds(np.concatenate([c.x for c in curves])),
-        spanning(np.concatenate(shown), zero),
+        _bounds(np.concatenate([c.x for c in curves])), spanning(np.concatenate(shown), zero)
     )
     drawn = [
         tag("path", d=_path(axes, *_thinned(c)), class_="curve", stroke=colour(c.order),

@@ -12,16 +12,7 @@ from typing import Any
 import numpy as np
 
 from micstools.pages import charts, motion, run_page, run_words, views
-from micstools.pages.html import (
-    Markup,
-    data,
-    document,
-    download,
-    markup,
-    section,
-    table,
-    tag,
-)
+from micstools.pages.html import Markup, data, document, download, markup, section, table, tag
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
 from micstools.piles import pile, pile_ensemble, placing

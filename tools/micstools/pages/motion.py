@@ -220,10 +220,7 @@ def speeds(run: Run) -> dict[str, Any]:
     whole = {name: np.array([found[name] for found in maps]) for name in first}
     moving = np.concatenate([values[values > 0] for values in whole.values()])
     fastest = float(np.percentile(moving, FASTEST)) if moving.size else 1.0
-    return {
-        "times": packed(times, "f4"),
-        "fastest": fastest,
-    } | {
+    return {"times": packed(times, "f4"), "fastest": fastest} | {
         name: {
             "nx": values.shape[2],
             "ny": values.shape[1],
@@ -242,11 +239,7 @@ def _speed_maps(run: Run, t: float, kept: tuple[slice, slice, slice]) -> dict[st
     top = len(wet) - 1 - np.argmax(wet[::-1], axis=0)
     i, j, k = kept
     plan = np.take_along_axis(speed, top[None], axis=0)[0]
-    return {
-        "plan": plan[j, i],
-        "front": speed.max(axis=1)[k, i],
-        "side": speed.max(axis=2)[k, j],
-    }
+    return {"plan": plan[j, i], "front": speed.max(axis=1)[k, i], "side": speed.max(axis=2)[k, j]}
 
 
 def _surface(run: Run, seen: Columns) -> dict[str, Any]:

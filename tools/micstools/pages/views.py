@@ -24,11 +24,7 @@ VIEWS = {
     "side": (np.array([0, 1, 0]), np.array([0, 0, 1]), np.array([1, 0, 0])),
     "top": (np.array([1, 0, 0]), np.array([0, 1, 0]), np.array([0, 0, 1])),
 }
-NAMES = {
-    "front": ("x", "z"),
-    "side": ("y", "z"),
-    "top": ("x", "y"),
-}
+NAMES = {"front": ("x", "z"), "side": ("y", "z"), "top": ("x", "y")}
 _LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
 FIXED = "#8d8d8d"
 BED = "#b7a78c"

@@ -253,12 +253,7 @@ def add_block(plotter: Plotter, points: Array, shape: Shape, colour: str) -> tup
 
 def _add_solid(plotter: Plotter, faces: Any, edges: Any, colour: str) -> tuple[Any, Any]:
     surface = plotter.add_mesh(
-        faces,
-        color=colour,
-        smooth_shading=False,
-        ambient=0.35,
-        diffuse=0.75,
-        specular=0.1,
+        faces, color=colour, smooth_shading=False, ambient=0.35, diffuse=0.75, specular=0.1
     )
     return surface, plotter.add_mesh(edges, color="#303030", line_width=1.5)
 

@@ -212,9 +212,5 @@ def raster(path: Path, values: Array, survey: Survey, low: Array, step: float) -
     return path
 
 
-WRITERS: dict[str, Callable[..., Path]] = {
-    "csv": to_csv,
-    "geojson": to_geojson,
-    "dxf": to_dxf,
-}
+WRITERS: dict[str, Callable[..., Path]] = {"csv": to_csv, "geojson": to_geojson, "dxf": to_dxf}
 """What can be written of one run, by its ending."""

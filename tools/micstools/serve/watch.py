@@ -15,14 +15,7 @@ from micstools.pages import ensemble_page, motion, run_page, run_words
 from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
-from micstools.serve.server import (
-    Site,
-    apart,
-    foreign_answer,
-    json_answer,
-    order_of,
-    page_answer,
-)
+from micstools.serve.server import Site, apart, foreign_answer, json_answer, order_of, page_answer
 
 MOST = 600  # rows of blocks that are read of a run
 
@@ -67,11 +60,7 @@ class Watched:
                 return {"parts": parts, "running": False, "key": ""}
             found = living.state(run)
             key = f"{self.began} {run.series.time[-1]}"
-            return {
-                "parts": watch_page.run_parts(run, found),
-                "running": found.running,
-                "key": key,
-            }
+            return {"parts": watch_page.run_parts(run, found), "running": found.running, "key": key}
 
     def scene(self) -> dict[str, Any]:
         """The motion so far."""

@@ -79,13 +79,7 @@ def run_frame(
     """The page of a run; its parts come later. `above` it and `more` buttons where it is part of
     something."""
     return document(
-        title,
-        above,
-        tag("h1", title),
-        *run_content(more),
-        script=_START,
-        more=SCRIPTS,
-        head=head,
+        title, above, tag("h1", title), *run_content(more), script=_START, more=SCRIPTS, head=head
     )
 
 

@@ -71,10 +71,7 @@ def metres(path: Path, unit: str) -> float:
 
 
 def load(
-    path: Path,
-    grid: float | None = None,
-    marks: Sequence[float] = (),
-    unit: str | None = None,
+    path: Path, grid: float | None = None, marks: Sequence[float] = (), unit: str | None = None
 ) -> HeightMap:
     """The map of a file in metres; `grid` [m] draws scattered points of an .xyz file to that
     spacing.
@@ -406,12 +403,14 @@ def _geotiff(path: Path, marks: Sequence[float], unit: str | None) -> HeightMap:
                      "--unit")  # fmt: skip
     x, y = along * (c + a / 2), along * (f + e / 2)
     step = [along * a, along * e]
-    z *= metres(path, told or unit or "m")
+    heights = told or unit or "m"
+    factor = metres(path, heights)
+    z *= factor
     if step[1] < 0:  # rows come from the north, as a rule
         z, y, step[1] = z[::-1], y + (len(z) - 1) * step[1], -step[1]
     remarks = [f"heights times {scale:g} plus {offset:g}"] * ((scale, offset) != (1, 0))
     remarks += [f"from {ground} to m"] * (along != 1)
-    remarks += [f"heights from {told or unit} to m"] * (metres(path, told or unit or "m") != 1)
+    remarks += [f"heights from {heights} to m"] * (factor != 1)
     return HeightMap((x, y), (step[0], step[1]), z, tuple(remarks))
 
 

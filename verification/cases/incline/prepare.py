@@ -6,12 +6,21 @@ from pathlib import Path
 import numpy as np
 
 ROWS = np.loadtxt(Path(__file__).with_name("D5.csv"), delimiter=",", skiprows=2)
-TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu:g}.
+
+for theta, mu, a_block, _ in ROWS:
+    along, down = 9.81 * np.sin(np.radians(theta)), -9.81 * np.cos(np.radians(theta))
+    runs = [("", "T", 1e-2, "springs")]
+    runs += [(f"_impulses_{1e3 * dt:g}ms", "F", dt, "impulses") for dt in (1e-3, 4e-3, 2e-2)]
+    if a_block <= 0.0:
+        runs.append(("_awake", "F", 1e-2, "springs"))
+    for kind, sleep, dt, solver in runs:
+        Path(f"deg{theta:.0f}_mu{100 * mu:03.0f}{kind}.nml").write_text(f"""\
+! Flat box and sphere on an incline of {theta:g} degrees, friction {mu:g}.
 ! cost: 0.1 s
 &run
   title = 'incline'
   physics = 'dry'
-  t_end = {end}
+  t_end = {0.6 if a_block > 0.0 else 2.0}
   dt = {dt:g}
   field_interval = 0.0
   restart_interval = 0.0
@@ -23,24 +32,4 @@ TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu
 &shape name = 'sphere'  kind = 'sphere'  size = 0.04 /
 &body  shape = 'box'  position = 0.1, 0.1, 0.01 /
 &body  shape = 'sphere'  position = 0.1, 0.2, 0.02 /
-"""
-
-for theta, mu, a_block, _ in ROWS:
-    slope = np.radians(theta)
-    runs = [("T", 1e-2, "springs")] + [("F", dt, "impulses") for dt in (1e-3, 4e-3, 2e-2)]
-    if a_block <= 0.0:
-        runs.append(("F", 1e-2, "springs"))
-    for sleep, dt, solver in runs:
-        text = TEXT.format(
-            theta=theta,
-            mu=mu,
-            end=0.6 if a_block > 0.0 else 2.0,
-            along=9.81 * np.sin(slope),
-            down=-9.81 * np.cos(slope),
-            sleep=sleep,
-            dt=dt,
-            solver=solver,
-        )
-        kind = f"_impulses_{1e3 * dt:g}ms" if solver == "impulses" else "_awake"
-        name = f"deg{theta:.0f}_mu{100 * mu:03.0f}{'' if sleep == 'T' else kind}.nml"
-        Path(name).write_text(text)
+""")

@@ -81,34 +81,29 @@ def text(name: str, what: Collapse, step: str) -> str:
     end = EARLY if divided > 1 or what.numerics else END
     if what.late and divided == 1:
         end = LATE
-    sides = {side: what.walls for side in ("x_min", "x_max", "y_min", "y_max", "z_min")}
-    if cells[1] == 1:
-        sides |= {"y_min": "slip", "y_max": "slip"}
-    walls = "  ".join(f"{side} = '{kind}'" for side, kind in (sides | {"z_max": what.top}).items())
-    said = [
-        f"! {name.replace('_', ' ')}: {'the default step' if divided == 1 else 'a tenth of it'}.",
-        f"! cost: {what.cost[divided > 1]:g} s",
-        "&run",
-        f"  title = '{name.replace('_', ' ')}'  t_end = {end:g}",
-        f"  dt = {0.01 / divided:g}  cfl_max = {0.5 / divided:g}",
-        f"  field_interval = 0.0  restart_interval = {end:g}",
-        "/",
-        f"&grid  cells = {numbers(cells)}  length = {numbers(length)} /",
-        f"&boundary  {walls} /",
-        f"&fluid  liquid_density = {density:g}  liquid_viscosity = {viscosity:g}",
-        f"  gas_viscosity = {what.gas:g}{'  water_level = 0.12' if what.body else ''} /",
-    ]
+    walls = {side: what.walls for side in ("x_min", "x_max", "y_min", "y_max", "z_min")}
+    walls |= {"y_min": "slip", "y_max": "slip"} if cells[1] == 1 else {}
+    sides = "  ".join(f"{side} = '{kind}'" for side, kind in (walls | {"z_max": what.top}).items())
+    low, high = (numbers(corner) for corner in what.corners)
+    inside = f"&water  min = {low}  max = {high} /"
     if what.body:
-        said += [
-            f"&shape  name = 'body'  kind = '{what.body}'  size = 0.03  density = 2500.0 /",
-            "&drop  shape = 'body'  position = 0.061, 0.0592, 0.16  orientation = 'random' /",
-        ]
-    else:
-        low, high = (numbers(corner) for corner in what.corners)
-        said += [f"&water  min = {low}  max = {high} /"]
-    if what.numerics:
-        said += [f"&numerics  {what.numerics} /"]
-    return "\n".join(said) + "\n"
+        inside = f"""&shape  name = 'body'  kind = '{what.body}'  size = 0.03  density = 2500.0 /
+&drop  shape = 'body'  position = 0.061, 0.0592, 0.16  orientation = 'random' /"""
+    called = name.replace("_", " ")
+    return f"""! {called}: {"the default step" if divided == 1 else "a tenth of it"}.
+! cost: {what.cost[divided > 1]:g} s
+&run
+  title = '{called}'  t_end = {end:g}
+  dt = {0.01 / divided:g}  cfl_max = {0.5 / divided:g}
+  field_interval = 0.0  restart_interval = {end:g}
+/
+&grid  cells = {numbers(cells)}  length = {numbers(length)} /
+&boundary  {sides} /
+&fluid  liquid_density = {density:g}  liquid_viscosity = {viscosity:g}
+  gas_viscosity = {what.gas:g}{"  water_level = 0.12" if what.body else ""} /
+{inside}
+{f"&numerics  {what.numerics} /" if what.numerics else ""}
+"""
 
 
 for name, what in COLLAPSES.items():
