@@ -22,7 +22,7 @@ import tomllib
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import f90nml
@@ -30,6 +30,7 @@ import f90nml
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tools"))
 
+from measures import expect  # noqa: E402
 from measures.checks import Checks, sound  # noqa: E402
 from micstools.cases import settings  # noqa: E402
 from micstools.reading.reader import Run  # noqa: E402
@@ -92,7 +93,8 @@ class Planned:
 
 def names() -> list[str]:
     """All cases that have a check."""
-    return sorted(path.parent.name for path in CASES.glob("*/check.py"))
+    tables = CASES.glob("*/expect.toml")
+    return sorted(path.parent.name for path in [*CASES.glob("*/check.py"), *tables])
 
 
 def prepare(name: str, work: Path) -> list[Path]:
@@ -175,10 +177,13 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     return time.perf_counter() - began
 
 
-def checker(case: str) -> ModuleType:
-    """The check.py of a case: `check(runs, checks)`, and `VARIES` if its runs leave the defaults.
-    It may import modules beside it, whose names must differ from case to case."""
+def checker(case: str) -> ModuleType | SimpleNamespace:
+    """The check.py of a case: `check(runs, checks)`, and `VARIES` if its runs leave the defaults;
+    or the table in its place. It may import modules beside it, whose names must differ from case to
+    case."""
     path = CASES / case / "check.py"
+    if not path.exists():
+        return expect.module(path.with_name("expect.toml"))
     spec = importlib.util.spec_from_file_location(f"check_{case}", path)
     if spec is None or spec.loader is None:
         raise RuntimeError(f"cannot read {path}")

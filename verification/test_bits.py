@@ -1,7 +1,9 @@
 """The same bits on any number of processes and threads, however the domain is cut, and after a
-restart."""
+restart; and no fused multiply-add, which would make them hang on what the compiler fused."""
 
 import os
+import re
+import shutil
 import subprocess
 from dataclasses import dataclass, field
 from functools import cache
@@ -139,3 +141,23 @@ def test_same_solutions(n: int) -> None:
     alone, start = solutions(serial), ["mpirun", "--bind-to", "none", "--oversubscribe"]
     assert len(alone) > 0
     assert solutions(*start, "-n", str(n), parallel) == alone
+
+
+FUSED = re.compile(r"\bv?f(n?m(add|sub)|m(addsub|subadd)|(n?m(la|ls)))\w*\s")
+OBJDUMP = shutil.which("objdump")
+
+
+@pytest.mark.skipif(OBJDUMP is None, reason="no objdump")
+@pytest.mark.parametrize("program", ["mics", "mics_mpi"])
+def test_no_fused_multiply_add(program: str) -> None:
+    binary = ROOT / program
+    if not binary.exists():
+        pytest.skip(f"./{program} is not built")
+    code = subprocess.run(
+        [str(OBJDUMP), "-d", "--no-show-raw-insn", str(binary)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert "mulpd" in code or "mulsd" in code or "fmul" in code
+    assert FUSED.findall(code) == []

@@ -1,9 +1,13 @@
 """The tables of checks, and the balances recomputed from a restart state."""
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from measures import balance, buoyancy
+from measures import balance, buoyancy, expect
 from measures.checks import Checks
 from micstools.reading.overlap import Placed
 from micstools.reading.reader import Grid, Run
@@ -26,6 +30,37 @@ def test_checks_hold_fail_and_are_never_empty() -> None:
         bad(checks)
         assert checks.failed == 1
     assert Checks("empty").failed == 1
+
+
+def expected(tmp_path: Path, row: str, name: str = "a_1") -> Checks:
+    """What a table with one row finds of a run of two bodies, of which one moves."""
+    bodies = SimpleNamespace(speed=np.array([0.0, 2.0]))
+    run: Any = SimpleNamespace(folder=Path(name), bodies=bodies, series=None, restart=None,
+                               value=lambda group, name: 0.5)  # fmt: skip
+    head = "varies = [\"contact\"]\nlet.most = \"b.speed.max() * value('run', 'dt')\"\n[[expect]]\n"
+    (tmp_path / "expect.toml").write_text(f"{head}quantity = '{{name}}: most {{most:g}}'\n{row}\n")
+    case, checks = expect.module(tmp_path / "expect.toml"), Checks("table")
+    assert case.VARIES == ("contact",)
+    case.check([run], checks)
+    return checks
+
+
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ('number = "most"\nbelow = 1.1', 'number = "most"\nbelow = 0.9'),
+        ('number = "most"\nwithin = ["most", 2]', 'number = "most"\nwithin = [0, 0.9]'),
+        ('number = "most"\nclose = 1.1\nband = 0.1', 'number = "most"\nclose = 1.1\nband = 0.05'),
+        ('number = "most"\nclose = "most"\nband = 0', 'number = "np.nan"\nclose = 1\nband = 9'),
+        ('true = "most == 1"\nfigures = "{most:.1f}"', 'true = "most > 1"'),
+    ],
+)
+def test_a_table_of_a_case_holds_and_fails(tmp_path: Path, good: str, bad: str) -> None:
+    (found,) = expected(tmp_path, good).results
+    assert found.quantity == "a_1: most 1" and found.holds and found.ours in ("1", "1.0")
+    assert expected(tmp_path, bad).failed == 1
+    assert expected(tmp_path, bad + "\ncounts = false").results[0].mark == "(misses)"
+    assert expected(tmp_path, bad + "\nruns = 'b*'").results == []
 
 
 def test_rows_for_information_and_bounds() -> None:

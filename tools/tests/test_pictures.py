@@ -1,18 +1,30 @@
-"""Pictures are made, have the right size, and show what they should."""
+"""Pictures and films show what they should; what is exported is read back by other programs."""
 
+import csv
+import json
+import os
+import signal
+import struct
 import subprocess
 import sys
+import time
+import warnings
+import weakref
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from calls import mics_tools
-from micstools.pictures import labels, plots, scene
-from micstools.reading.reader import Run
+from micstools.pictures import exports, labels, movie, plots, reel, scene
+from micstools.pictures.movie import Film
+from micstools.reading.reader import BadRun, Run
 from micstools.shapes.shape import hexapod
 from synthetic import UPRIGHT, Motion, write_run
 
@@ -220,3 +232,330 @@ def test_check_pile_prints_the_findings(loose_pile: Run) -> None:
     command = [sys.executable, TOOLS / "check_pile.py", loose_pile.folder]
     shown = subprocess.run(command, capture_output=True, check=True, text=True)
     assert "pattern A" in shown.stdout
+
+
+def test_the_table_holds_every_row(loose_pile: Run, tmp_path: Path) -> None:
+    b = loose_pile.bodies
+    with exports.to_csv(loose_pile, 0, tmp_path).open() as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == len(b.time) * b.n
+    line = table[150 * b.n + 4]
+    assert (line["block"], line["shape"], line["released"]) == ("5", "hexapod", "1")
+    assert [float(line[name]) for name in ("time", "x", "qz", "vz")] == [
+        b.time[150], b.position[150, 4, 0], b.quaternion[150, 4, 3], b.velocity[150, 4, 2]
+    ]  # fmt: skip
+    assert table[9 * 10 + 8]["released"] == "0"
+
+
+def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0))  # too late for the third and later ones
+    b = run.bodies
+    assert mics_tools(["export", str(run.folder), "--to", "csv", "--final"]) == 0
+    said = capsys.readouterr()
+    path = run.folder / "export" / "final.csv"
+    assert said.out == f"{path}\n"
+    assert "left out, not in the tank at the end: 6, 7, 8, 9" in said.err
+    assert not (run.folder / "export" / "blocks.csv").exists()
+    with path.open() as file:
+        table = list(csv.DictReader(file))
+    heads = ["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"]
+    assert list(table[0]) == heads
+    assert [line["block"] for line in table] == ["1", "2", "3", "4", "5"]
+    for k, line in enumerate(table):
+        assert [float(line[name]) for name in ("x", "y", "z")] == b.position[-1, k].tolist()
+        turn = [float(line[name]) for name in ("qw", "qx", "qy", "qz")]
+        assert turn == b.quaternion[-1, k].tolist()
+        assert line["fixed"] == str(int(k < 3))
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_the_pile_is_closed_and_each_block_has_its_name(
+    loose_pile: Run, tmp_path: Path, kind: str
+) -> None:
+    row = loose_pile.bodies.row(2.5)  # three are dropped
+    path = exports.FORMATS[kind](loose_pile, row, tmp_path)
+    mark = {"stl": "solid ", "obj": "o "}[kind]
+    names = [line.split()[1] for line in path.read_text().splitlines() if line.startswith(mark)]
+    assert names == [f"block-{k}" for k in range(1, 7)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mesh = trimesh.load(path, force="mesh")
+    mesh.merge_vertices()
+    assert mesh.is_watertight and mesh.volume == pytest.approx(6 * 56e-6, rel=1e-5)
+    points = np.concatenate([loose_pile.points(k, row) for k in range(6)])
+    assert mesh.bounds == pytest.approx(np.array([points.min(axis=0), points.max(axis=0)]))
+
+
+def parts_of(path: Path) -> tuple[dict, bytes]:
+    content = path.read_bytes()
+    magic, version, length = struct.unpack_from("<4sII", content)
+    assert (magic, version, length) == (b"glTF", 2, len(content))
+    size, kind = struct.unpack_from("<I4s", content, 12)
+    about, start = json.loads(content[20 : 20 + size]), 20 + size
+    assert kind == b"JSON" and content[start + 4 : start + 8] == b"BIN\0"
+    return about, content[start + 8 :]
+
+
+def array_of(about: dict, numbers: bytes, number: int) -> np.ndarray:
+    accessor = about["accessors"][number]
+    view = about["bufferViews"][accessor["bufferView"]]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+    found = np.frombuffer(numbers, "<f4", accessor["count"] * width, view["byteOffset"])
+    return found.reshape(-1, width)
+
+
+def test_the_film_moves_each_block(loose_pile: Run, tmp_path: Path) -> None:
+    path = exports.to_glb(loose_pile, 0, tmp_path)
+    about, numbers = parts_of(path)
+    b, film = loose_pile.bodies, about["animations"][0]
+    assert [node["name"] for node in about["nodes"]] == [f"block {k}" for k in range(1, 10)] + [
+        "tank"
+    ]
+    found = {}
+    for channel in film["channels"]:
+        sampler = film["samplers"][channel["sampler"]]
+        what = (channel["target"]["node"], channel["target"]["path"])
+        found[what] = array_of(about, numbers, sampler["output"])
+        times = array_of(about, numbers, sampler["input"])[:, 0]
+    rows = np.searchsorted(b.time, times - 1e-6)
+    assert times[0] == 0 and times[-1] == pytest.approx(b.time[-1])
+    assert found[5, "translation"] == pytest.approx(b.position[rows, 5], abs=1e-7)
+    assert found[5, "rotation"][:, 3] == pytest.approx(b.quaternion[rows, 5, 0], abs=1e-6)
+    assert found[5, "rotation"][:, :3] == pytest.approx(b.quaternion[rows, 5, 1:], abs=1e-6)
+    assert (found[5, "scale"][:, 0] > 0.5).tolist() == (times >= 2.0 - 1e-6).tolist()
+    assert (0, "translation") not in found and (3, "scale") not in found
+
+
+def test_other_programs_read_the_film(loose_pile: Run, tmp_path: Path) -> None:
+    """As trimesh does: y is up there, and z runs to the viewer."""
+    found = trimesh.load(exports.to_glb(loose_pile, 0, tmp_path))
+    points = np.concatenate([loose_pile.points(k, 0) for k in range(9)])
+    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+    wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
+    assert found.bounds == pytest.approx(wanted, abs=1e-6)
+
+
+def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
+    """Places count from a node at the corner of the tank: single precision holds them there."""
+    corner = (354200.0, 5621080.0, -12.0)
+    run = Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=corner)))
+    path = exports.to_glb(run, 0, tmp_path)
+    assert parts_of(path)[0]["nodes"][-1]["translation"] == [354200.0, -12.0, -5621080.0]
+    points = np.concatenate([run.points(k, 0) for k in range(9)])
+    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+    wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
+    assert np.abs(trimesh.load(path).bounds - wanted).max() < 1e-5
+
+
+@can_draw
+def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) -> None:
+    import pyvista as pv
+
+    exports.to_pvd(loose_pile, 0, tmp_path)
+    text = (tmp_path / "blocks.pvd").read_text()
+    assert text.count("<DataSet") == len(loose_pile.field_times)
+    frames = pv.PVDReader(tmp_path / "fields.pvd")
+    assert frames.time_values == pytest.approx(loose_pile.field_times)
+    image = pv.read(tmp_path / "fields-00004.vti")
+    fields = loose_pile.fields_at(2.0)
+    assert image.bounds == pytest.approx((0, 0.3, 0, 0.1, 0, 0.2))
+    assert np.array_equal(image.cell_data["liquid"], fields.liquid.ravel())
+    assert np.array_equal(image.cell_data["velocity"], fields.velocity.reshape(-1, 3))
+    blocks = pv.read(tmp_path / "blocks-00004.vtp")
+    assert set(blocks.cell_data["body"]) == {1, 2, 3, 4, 5, 6}
+    assert blocks.volume == pytest.approx(6 * 56e-6, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--to", "png"], "'png' is none of glb, stl, shapes, obj, csv, pvd"),
+     (["--to", "stl", "--time", "99"], "the run goes from 0 to 8 s"),
+     (["--to", "stl", "--final"], "--final is of csv")],
+)  # fmt: skip
+def test_wrong_wishes_are_one_line(loose_pile: Run, words: list[str], said: str, capsys) -> None:
+    assert mics_tools(["export", str(loose_pile.folder), *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+def test_each_shape_has_its_file(loose_pile: Run, tmp_path: Path) -> None:
+    folder = exports.to_shapes(loose_pile, 0, tmp_path)
+    assert [path.stem for path in folder.iterdir()] == list(loose_pile.shapes)
+    mesh = trimesh.load(folder / "hexapod.stl", force="mesh")
+    mesh.merge_vertices()
+    assert mesh.is_watertight and mesh.volume == pytest.approx(56e-6, rel=1e-5)
+
+
+ROOT = Path(__file__).parents[2]
+
+has_ffmpeg = pytest.mark.skipif(not movie.encoder(), reason=movie.NO_ENCODER)
+has_ffprobe = pytest.mark.skipif(not movie.shutil.which("ffprobe"), reason="no ffprobe here")
+
+
+@pytest.mark.parametrize(
+    ("slow", "caption"),
+    [(1, "t = 2.50 s"), (4, "t = 2.50 s, 4 times slower"), (0.04, "t = 2.50 s, 25 times faster")],
+)
+def test_caption(slow: float, caption: str) -> None:
+    assert Film(slow=slow).caption(2.5) == caption
+
+
+def test_slow_motion_has_more_pictures(loose_pile: Run) -> None:
+    assert len(Film().times(loose_pile)) == 8 * 25 + 1
+    slow = Film(begin=1.0, end=2.0, slow=4, rate=10).times(loose_pile)
+    assert len(slow) == 41 and slow[[0, -1]] == pytest.approx([1.0, 2.0])
+    with pytest.raises(BadRun, match="holds nothing of the run, which goes from 0 to 8 s"):
+        Film(begin=9.0).times(loose_pile)
+
+
+@can_draw
+@has_ffmpeg
+@pytest.mark.parametrize("view", movie.VIEWS)
+def test_a_gif_moves(loose_pile: Run, tmp_path: Path, view: str) -> None:
+    film = Film(view, 2.1, 2.4, rate=10, width=160)
+    path = movie.write(loose_pile, film, tmp_path / "a.gif")
+    with Image.open(path) as found:
+        assert found.n_frames == 4 and found.width == 160
+        assert found.info["duration"] == 100
+        frames = []
+        for k in (0, 3):
+            found.seek(k)
+            frames.append(np.asarray(found.convert("RGB")).astype(int))
+    assert (np.abs(frames[0] - frames[1]).max(axis=2) > 60).mean() > 0.002
+
+
+@can_draw
+@has_ffmpeg
+@has_ffprobe
+def test_an_mp4_has_its_length(loose_pile: Run, tmp_path: Path, capsys) -> None:
+    path = tmp_path / "a.mp4"
+    words = ["movie", str(loose_pile.folder), "--from", "2", "--until", "2.4", "--rate", "10"]
+    assert mics_tools([*words, "--slow", "2", "--width", "161", "--out", str(path)]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines() == ["9 pictures", str(path)]
+    told = said.err.splitlines()
+    assert told[0].startswith("1 of 9 pictures") and told[-1].startswith("9 of 9 pictures")
+    ask = ["ffprobe", "-v", "error", "-count_frames", "-show_entries",
+           "stream=codec_name,width,nb_read_frames", "-of", "csv=p=0", str(path)]  # fmt: skip
+    done = subprocess.run(ask, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "h264,160,9"
+
+
+@can_draw
+def test_what_cannot_be_made_is_said_first(loose_pile: Run, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(movie.shutil, "which", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    for more, said in (
+        ([], "pip install imageio-ffmpeg, or apt-get install ffmpeg"),
+        (["--out", "a.gif"], "pip install imageio-ffmpeg, or apt-get install ffmpeg"),
+        (["--out", "a.avi"], "must end in .mp4 or .gif"),
+        (["--slow", "0"], "--slow 0.0: must be positive"),
+    ):
+        assert mics_tools(["movie", str(loose_pile.folder), *more]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert said in line
+
+
+def test_the_encoder_comes_with_the_tools(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That of imageio-ffmpeg goes before one of the system."""
+    brought = SimpleNamespace(get_ffmpeg_exe=lambda: "/brought/ffmpeg")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", brought)
+    assert movie.encoder() == "/brought/ffmpeg"
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(movie.shutil, "which", lambda name: f"/system/{name}")
+    assert movie.encoder() == "/system/ffmpeg"
+
+
+def plain_pictures(n: int, alive: list[int] | None = None) -> Iterator[Image.Image]:
+    """Pictures of one colour; notes how many of them are held at a time."""
+    held: list[weakref.ref[Image.Image]] = []
+    for k in range(n):
+        image = Image.new("RGB", (64, 48), (5 * k % 256, 80, 120))
+        held.append(weakref.ref(image))
+        if alive is not None:
+            alive.append(sum(found() is not None for found in held))
+        yield image
+        del image
+
+
+@has_ffmpeg
+@pytest.mark.parametrize("kind", movie.KINDS)
+def test_pictures_are_not_gathered(loose_pile, tmp_path: Path, monkeypatch, kind: str) -> None:
+    alive: list[int] = []
+    monkeypatch.setattr(movie, "pictures", lambda *_: plain_pictures(60, alive))
+    movie.write(loose_pile, Film(), tmp_path / f"a{kind}")
+    assert len(alive) == 60 and max(alive) <= 3
+
+
+@has_ffmpeg
+@pytest.mark.parametrize("error", [KeyboardInterrupt, BadRun("broken")])
+def test_nothing_unfinished_is_left(
+    loose_pile: Run, tmp_path: Path, monkeypatch, error: BaseException
+) -> None:
+    """Nor is an older film lost."""
+
+    def broken(*_: object) -> Iterator[Image.Image]:
+        yield from plain_pictures(5)
+        raise error
+
+    monkeypatch.setattr(movie, "pictures", broken)
+    old = tmp_path / "a.mp4"
+    old.write_text("an older film")
+    with pytest.raises((KeyboardInterrupt, BadRun)):
+        movie.write(loose_pile, Film(), old)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
+    assert old.read_text() == "an older film"
+
+
+@can_draw
+@has_ffmpeg
+def test_a_stopped_film_leaves_nothing(loose_pile: Run, tmp_path: Path) -> None:
+    words = ["-m", "micstools.cli", "movie", loose_pile.folder, "--out", tmp_path / "a.mp4"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
+    with subprocess.Popen(
+        [sys.executable, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as running:
+        assert running.stderr
+        running.stderr.readline()  # the first pictures are told
+        for _ in range(100):
+            if list(tmp_path.iterdir()):
+                break
+            time.sleep(0.05)
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(30) == 143
+    assert list(tmp_path.iterdir()) == []
+
+
+@can_draw
+def test_a_reel_builds_nothing_twice(loose_pile: Run, monkeypatch) -> None:
+    """The water anew for each written time, all else once; blocks move all the same."""
+    found = reel.Reel(loose_pile, 160, 0.6, water=True)
+    added: list[str] = []
+    add = type(found._plotter).add_mesh
+
+    def noted(self: object, *mesh: object, **look: object) -> object:
+        added.append(str(look.get("name", "")))
+        return add(self, *mesh, **look)
+
+    monkeypatch.setattr(type(found._plotter), "add_mesh", noted)
+    camera = scene.camera_for(loose_pile.grid.low, loose_pile.grid.high, "front")
+    seen = [np.asarray(found.draw(t, camera)).astype(int) for t in (2.10, 2.14, 2.20, 2.60, 2.64)]
+    found.close()
+    assert added == 2 * list(scene.WATER_PARTS)
+    assert (np.abs(seen[0] - seen[2]).max(axis=2) > 60).mean() > 0.002
+
+
+@can_draw
+def test_a_reel_shows_what_a_picture_shows(loose_pile: Run, tmp_path: Path) -> None:
+    """But for the smoothing of edges."""
+    style = scene.Style(width=600, arrows=False, label=False)
+    path = scene.picture(loose_pile, 4.5, "front", tmp_path / "a.png", style)
+    camera = scene.camera_for(loose_pile.grid.low, loose_pile.grid.high, "front")
+    found = reel.Reel(loose_pile, 600, camera.aspect, water=True)
+    drawn = found.draw(4.5, camera)
+    found.close()
+    with Image.open(path) as image:
+        assert drawn.size == image.size
+        wanted, seen = (np.asarray(i.convert("RGB").reduce(6)).astype(int) for i in (image, drawn))
+    far = np.abs(seen - wanted)
+    assert (far > 50).mean() < 0.01 and far.mean() < 6

@@ -1,14 +1,21 @@
-"""The reader against files as the program writes them, finished, growing and missing."""
+"""The reader against files as the program writes them, finished, growing, missing, damaged; tables
+for pandas and xarray; units by the size of the blocks."""
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
+from micstools import cli
+from micstools.reading import result_file, units
 from micstools.reading.profiles import along_line, table
-from micstools.reading.reader import Run
+from micstools.reading.reader import BadRun, Run
+from micstools.serve import living
 from synthetic import THREE_LEGS, Motion, write_run
 
 
@@ -189,3 +196,233 @@ def test_the_scene_without_water_is_that_of_the_nearest_row(
 def test_a_scene_outside_of_the_run_is_refused(loose_pile: Run, t: float) -> None:
     with pytest.raises(ValueError, match=rf"t = {t:g} s: the run goes from 0 to 8 s"):
         loose_pile.vtk(t)
+
+
+Damage = Callable[[h5py.File], None]
+
+
+def put(name: str, values: object, **how: object) -> Damage:
+    """Other values in the place of a dataset."""
+
+    def damage(h5: h5py.File) -> None:
+        if name in h5:
+            del h5[name]
+        if how:
+            h5.create_dataset(name, **how)
+        elif not isinstance(values, (h5py.SoftLink, h5py.ExternalLink)):
+            h5.create_dataset(name, data=values)
+        else:
+            h5[name] = values
+
+    return damage
+
+
+def drop(name: str) -> Damage:
+    def damage(h5: h5py.File) -> None:
+        del h5[name]
+
+    return damage
+
+
+def say(name: str, value: object) -> Damage:
+    def damage(h5: h5py.File) -> None:
+        h5["provenance"].attrs[name] = value
+
+    return damage
+
+
+def elsewhere(h5: h5py.File) -> None:
+    del h5["bodies/mass"]
+    layout = h5py.VirtualLayout(shape=(9,), dtype=float)
+    layout[:] = h5py.VirtualSource("other.h5", "mass", shape=(9,))
+    h5.create_virtual_dataset("bodies/mass", layout)
+
+
+KINDS: dict[str, Damage] = {
+    "no bodies": drop("bodies"),
+    "no series": drop("series"),
+    "no grid": drop("grid"),
+    "no provenance": drop("provenance"),
+    "no shapes": drop("shapes"),
+    "a column is missing": drop("bodies/velocity"),
+    "a group for a dataset": lambda h5: (drop("bodies/mass")(h5), h5.create_group("bodies/mass")),
+    "a dataset for a group": put("series", [1.0]),
+    "texts for numbers": put("bodies/mass", ["a"] * 9),
+    "another number of bodies": put("bodies/mass", np.ones(4)),
+    "vectors of two": put("bodies/position", np.zeros((11, 9, 2))),
+    "a single number": put("series/time", 1.0),
+    "times that fall": put("series/time", np.arange(11.0)[::-1]),
+    "a time that is none": put("bodies/time", np.full(11, np.nan)),
+    "no cells": put("grid/x", [0.0]),
+    "a corner that is not there": put("shapes/hexapod/triangles", [[0, 1, 10**6]]),
+    "a shape of no name": put("bodies/shape", [b"\xff\xfe"] * 9),
+    "a status in words": say("exit_status", "well"),
+    "words for a number": say("parameters", "&run t_end = 'soon' /"),
+    "no namelist": say("parameters", "&run t_end = ((("),
+    "a huge repeat": say("parameters", "&run t_end = 999999999*0.1 /"),
+    "more than it holds": put("bodies/mass", None, shape=(10**12,), dtype=float, chunks=(10**6,)),
+    "data in another file": put("bodies/mass", None, shape=(9,), dtype=float,
+                                external=[("/etc/passwd", 0, 72)]),
+    "virtual data": elsewhere,
+    "a link outside": put("bodies", h5py.ExternalLink("/etc/passwd", "/bodies")),
+    "a link inside": put("bodies/mass", h5py.SoftLink("/bodies/time")),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_run(tmp_path_factory.mktemp("whole") / "run", Motion(t_end=0.2))
+
+
+@pytest.fixture
+def broken(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy, and no patience with it."""
+    monkeypatch.setattr(result_file.take, "__defaults__", ((),))
+    return shutil.copytree(whole, tmp_path / "run")
+
+
+def look(run: Run) -> None:
+    """All that is read of a run."""
+    str(run), run.shapes, run.bed, run.series, run.timers, run.sides, run.gravity  # noqa: B018
+    living.state(run)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_file_is_one_line(broken: Path, kind: str, capsys) -> None:
+    with h5py.File(broken / "run.h5", "r+") as h5:
+        KINDS[kind](h5)
+    with pytest.raises(BadRun, match=r"run\.h5: .*") as told:
+        look(Run(broken))
+    assert "\n" not in str(told.value)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["report", str(broken)])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert end.value.code == 2 and line.startswith(f"mics-tools report: {broken}/run.h5: ")
+
+
+def test_a_file_of_other_bytes_is_one_line(broken: Path) -> None:
+    """Cut anywhere, or with zeros in the place of a part."""
+    content = (broken / "run.h5").read_bytes()
+    for n in range(0, len(content), len(content) // 40):
+        for damaged in (content[:n], content[:n] + bytes(512) + content[n + 512 :]):
+            (broken / "run.h5").write_bytes(damaged)
+            try:
+                look(Run(broken))
+            except BadRun as told:
+                assert str(told).startswith(f"{broken}/run.h5: ") and "\n" not in str(told)
+
+
+def test_blocks_as_a_table(loose_pile: Run) -> None:
+    b, found = loose_pile.bodies, loose_pile.blocks
+    assert len(found) == b.n * len(b.time)
+    row = found[(found.block == 4) & (found.time == b.time[5])].iloc[0]
+    assert row[["x", "y", "z"]].tolist() == b.position[5, 3].tolist()
+    assert row["contact_ty"] == b.contact_torque[5, 3, 1] and row["shape"] == b.shape[3]
+    assert row["released"] == int(b.present(5)[3])
+    last = found.groupby("block").last()
+    assert last.z.to_numpy() == pytest.approx(b.position[-1, :, 2])
+    units = found.attrs["units"]
+    assert (units["x"], units["vx"], units["fluid_tz"]) == ("m", "m/s", "N m")
+
+
+def test_places_as_a_table(loose_pile: Run) -> None:
+    found = loose_pile.places
+    assert list(found.columns) == list(found.attrs["meaning"])
+    assert found.z.to_numpy() == pytest.approx(loose_pile.bodies.position[-1, :, 2])
+
+
+def test_fields_have_named_axes_and_units(loose_pile: Run) -> None:
+    found, cells = loose_pile.fields, loose_pile.grid.centres
+    assert found.liquid.dims == ("time", "z", "y", "x")
+    assert found.velocity.dims == ("time", "z", "y", "x", "component")
+    assert (found.pressure.attrs["units"], found.x.attrs["units"]) == ("Pa", "m")
+    assert found.x.to_numpy() == pytest.approx(cells[0])
+    one = loose_pile.fields_at(2.0)
+    then = found.sel(time=2.0)
+    assert (then.liquid.to_numpy() == one.liquid).all()
+    assert (then.velocity.sel(component="z").to_numpy() == one.velocity[..., 2]).all()
+    level = float(then.liquid.sel(x=0.1, y=0.05, method="nearest").sum("z")) * 0.005
+    assert level == pytest.approx(one.liquid[:, 10, 20].sum() * 0.005, rel=0.05)
+
+
+def test_fields_are_read_when_wanted(loose_pile: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mean over one time reads that time alone."""
+    run = Run(loose_pile.folder)
+    found, asked, frame = run.fields, [], run.frame
+    assert "dask" in type(found.liquid.data).__module__
+    monkeypatch.setattr(run, "frame", lambda *words: asked.append(words) or frame(*words))
+    assert float(found.solid.isel(time=3).mean()) == pytest.approx(
+        float(run.fields_at(run.field_times[3]).solid.mean()), rel=1e-5
+    )
+    assert asked == [("solid", 3)]
+    assert found.solid.mean(("x", "y", "z")).to_numpy().shape == run.field_times.shape
+
+
+def test_a_run_without_fields(make_run) -> None:
+    run = make_run(Motion(t_end=1.0))
+    (run.folder / "fields.vtkhdf").unlink()
+    assert list(run.fields.data_vars) == [] and run.fields.sizes["time"] == 0
+
+
+def test_a_run_is_shown(loose_pile: Run) -> None:
+    assert repr(loose_pile) == str(loose_pile)
+    shown = loose_pile._repr_html_()
+    assert shown.startswith("<pre>") and "heading_deg" in shown
+    assert np.char.count(shown, "<tr") >= loose_pile.bodies.n
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(6.789, "6.79"), (0.4, "0.4"), (6790.0, "6790"), (1.0132e6, "1.01e+06"), (123456.0, "123000"),
+     (0.0, "0"), (-0.01234, "-0.0123"), (3.2e-7, "3.2e-07"), (999.7, "1000"), (float("nan"), "–")],
+)  # fmt: skip
+def test_figures_have_three_digits(value: float, words: str) -> None:
+    assert units.figure(value) == words
+
+
+class Plain:
+    """Units with their texts in plain blanks."""
+
+    def __init__(self, of: units.Units) -> None:
+        self.of = of
+
+    def __getattr__(self, kind: str) -> Any:
+        unit = self.of.of_kind(kind)
+        text = lambda value: unit.text(value).replace("\u00a0", " ")  # noqa: E731
+        return SimpleNamespace(text=text, plain=unit.plain)
+
+
+def test_units_grow_with_the_blocks() -> None:
+    laboratory, site = units.of_size(0.06), units.of_size(2.0)
+    assert laboratory.length.text(0.0679) == "67.9\u00a0mm"
+    laboratory, site = Plain(laboratory), Plain(site)
+    assert laboratory.length.text(0.0679) == "67.9 mm" and site.length.text(6.79) == "6.79 m"
+    assert laboratory.area.text(0.0123) == "123 cm²" and site.area.text(61.2) == "61.2 m²"
+    assert laboratory.volume.text(56e-6) == "56 cm³" and site.volume.text(2.24) == "2.24 m³"
+    assert laboratory.mass.text(0.129) == "0.129 kg" and site.mass.text(5376.0) == "5.38 t"
+    assert laboratory.force.text(1.264) == "1.26 N" and site.force.text(1.01e6) == "1010 kN"
+    assert laboratory.energy.text(0.0757) == "75.7 mJ" and site.energy.text(6790.0) == "6.79 kJ"
+    assert laboratory.speed.text(0.512) == site.speed.text(0.512) == "0.512 m/s"
+    assert site.area.plain(61.2) == "61.2 m2" and site.area.plain(float("nan")) == "-"
+
+
+def test_arrays_and_several_figures() -> None:
+    site = units.of_size(2.0)
+    assert site.force.of(np.array([1e3, 2e3])) == pytest.approx([1.0, 2.0])
+    assert site.length.row([26.0, 6.0, 12.8], " x ") == "26 x 6 x 12.8\u00a0m"
+
+
+def run(lengths: list[float], tank: float = 1.0) -> Any:
+    names = [str(k) for k in range(len(lengths))]
+    return SimpleNamespace(
+        bodies=SimpleNamespace(n=len(names), shape=names),
+        shapes={name: SimpleNamespace(length=v) for name, v in zip(names, lengths, strict=True)},
+        grid=SimpleNamespace(low=np.zeros(3), high=np.array([tank, 0.1, 0.1])),
+    )
+
+
+def test_the_largest_block_decides_or_the_tank() -> None:
+    assert units.of_run(run([0.05, 2.0])).length.name == "m"
+    assert units.of_run(run([0.05])).length.name == "mm"
+    assert units.of_run(run([], tank=1.0)).length.name == "mm"
+    assert units.of_run(run([], tank=100.0)).length.name == "m"

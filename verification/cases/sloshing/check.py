@@ -10,7 +10,7 @@ from micstools.reading.reader import Run
 PERIOD_BAND = 0.01
 COUNTS_FROM = 32  # cells per wavelength
 MODES = table(__file__, "B2_sloshing_linear.csv")
-EXACT = float(MODES.query("L_m == 0.3 and h_m == 0.15 and mode_n == 1").T_s.iloc[0])
+EXACT = float(MODES.query("L_m == 0.3 and h_m == 0.15 and mode_n == 1").T2_s.iloc[0])
 
 
 def check(runs: list[Run], checks: Checks) -> None:
