@@ -148,7 +148,10 @@ def _encode(found: Iterator[Image.Image], film: Film, path: Path, unfinished: Pa
 
 def _feed(pipe: IO[bytes], found: Iterator[Image.Image], size: tuple[int, int]) -> None:
     """Write the pictures, cut to a size, and close; an encoder that ends early says why itself."""
-    with contextlib.suppress(BrokenPipeError):
-        for image in found:
+    for image in found:  # may itself meet a pipe that nobody reads: that of standard error
+        try:
             pipe.write(image.crop((0, 0, *size)).tobytes())
+        except BrokenPipeError:
+            return
+    with contextlib.suppress(BrokenPipeError):
         pipe.close()
