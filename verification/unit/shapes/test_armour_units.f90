@@ -6,6 +6,7 @@ module test_armour_units_m
   use rotations_m, only: rotate
   use tet_mesh_m, only: shape_t
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos
+  use surface_nets_m, only: check_net
   implicit none
   private
   public :: test_armour_units
@@ -47,7 +48,7 @@ contains
     end do
     call check('tetrapod: first leg for second', is_kept(s, &
       quaternion_from_axis(z + [sqrt(8.0_wp), 0.0_wp, -1.0_wp]/3, pi)))
-    call check('tetrapod: Euler''s number', euler(s), 2)
+    call check_net('tetrapod', s%point, s%facet, s%facet_point, 2)
   end subroutine check_tetrapod
 
   !> Figure 7-111: for a height of 1 the waist is 0.32 wide, the tips 0.20. One fluke is the other
@@ -74,7 +75,7 @@ contains
       1.0_wp], pi)))
     call check('dolos: its mirror image', is_found(s, s%point*spread([1.0_wp, 1.0_wp, -1.0_wp], 2, &
       size(s%point, 2))))
-    call check('dolos: Euler''s number', euler(s), 2)
+    call check_net('dolos', s%point, s%facet, s%facet_point, 2)
   end subroutine check_dolos
 
   !> A prism of 6 r sides with ends as large as the circle.
@@ -86,7 +87,7 @@ contains
     call check('cylinder: ends', area_above(s, 1.5_wp), pi, 1.0e-13_wp)
     call check('cylinder: a side for the next', is_kept(s, quaternion_from_axis(z, &
       pi/(3*refinement))))
-    call check('cylinder: Euler''s number', euler(s), 2)
+    call check_net('cylinder', s%point, s%facet, s%facet_point, 2)
     call check('cylinder: faces', size(s%facet) - 1, 2 + 6*refinement)
   end subroutine check_cylinder
 
@@ -118,15 +119,6 @@ contains
       end associate
     end do
   end function area_above
-
-  !> Corners - edges + faces of the surface.
-  pure integer function euler(s)
-    type(shape_t), intent(in) :: s
-    integer :: p
-
-    euler = count([(any(s%facet_point == p), p=1, size(s%point, 2))]) - size(s%facet_point)/2 &
-      + size(s%facet) - 1
-  end function euler
 
   !> Whether a turn puts every corner of the surface in the place of another.
   pure logical function is_kept(s, q)

@@ -125,7 +125,7 @@ contains
     call grid_init(case%grid, case%boundary, grid)
     call set_bed(case, form, bed, message)
     call check('the bed is made: '//message, bed%there)
-    allocate (blocks%present(0))
+    allocate (blocks%present(0), blocks%x(3, 0), blocks%q(4, 0))
     call solid_geometry_init(grid, solid, 1)
     call solid_fraction_init(grid, blocks, fraction, bed=bed)
     call update_solid(fraction, grid, blocks, solid)
@@ -138,12 +138,20 @@ contains
     type(bed_form_t) :: form
     type(grid_t) :: grid
     type(solid_geometry_t) :: solid
-    real(wp) :: worst(4), height
-    integer :: i, j
+    type(cut_cell_t) :: cut
+    real(wp) :: worst(5), height
+    integer :: i, j, m
 
     call sloping_tank(case, form)
     call fill(case, form, grid, solid)
+    call cut_cell_init(cut)
     worst = 0.0_wp
+    do m = 1, solid%n_cut
+      associate (c => solid%cut_cell(:, m))
+        call load_cut_cell(solid, m, grid%face(c, [1, 2, 3]), grid%h, cut)
+        worst(5) = max(worst(5), abs(cut%open - 1.0_wp + solid%alpha(c(1), c(2), c(3))))
+      end associate
+    end do
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
         height = dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])
@@ -163,6 +171,8 @@ contains
     call check('of the faces in x', worst(2), 0.0_wp, 1.0e-15_wp)
     call check('of the faces in y', worst(3), 0.0_wp, 1.0e-15_wp)
     call check('centres inside', worst(4), 0.0_wp, 0.0_wp)
+    call check('its tetrahedra fill the cut cells', worst(5), 0.0_wp, 1.0e-13_wp)
+    call check('there are many', solid%n_cut > 50)
     call check('of the faces in z, by points', worst_level_face(grid, solid), 0.0_wp, 0.03_wp)
   end subroutine volume_of_slope
 

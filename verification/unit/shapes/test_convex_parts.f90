@@ -7,6 +7,7 @@ module test_convex_parts_m
   use tet_mesh_m, only: surface_of_tets
   use convex_parts_m, only: points_t, parts_t, begin_part, add_face, end_part, add_frustum, &
     tets_of_parts, net_of_parts
+  use surface_nets_m, only: check_net
   implicit none
   private
   public :: test_convex_parts
@@ -32,7 +33,7 @@ contains
 
     points%same = 1.0e-9_wp
     call add_frustum(2*square, square + at(0, 0, 3), points, parts)
-    call check_net(parts, points, 2, 6, 7.0_wp)
+    call check_parts(parts, points, 2, 6, 7.0_wp)
     call check('corners', points%n, 8)
   end subroutine check_frustum
 
@@ -53,7 +54,7 @@ contains
         if (.not. btest(i, f - 1)) call add_face(x(:, other([3, 2, 1], f)), points, parts)
       end do
       call end_part(points, parts)
-      call check_net(parts, points, 2, 4, 1.0_wp/6)
+      call check_parts(parts, points, 2, 4, 1.0_wp/6)
     end do
   end subroutine check_either_way_round
 
@@ -96,7 +97,7 @@ contains
 
     points%same = 1.0e-9_wp
     call add_frustum(hexagon, hexagon + spread([0.0_wp, 0.0_wp, 1.0_wp], 2, 6), points, parts)
-    call check_net(parts, points, 2, 8, 6.0_wp)
+    call check_parts(parts, points, 2, 8, 6.0_wp)
     call tets_of_parts(parts, .false., 1, points, tet)
     call check('from a corner', size(tet, 2), 2*4 + 6*2)
     call tets_of_parts(parts, .true., 1, points, tet)
@@ -112,7 +113,7 @@ contains
     call add_frustum(2*square, square + at(0, 0, 3), points, parts)
     call add_frustum(square + at(0, 0, 3) + 1.0e-10_wp, 2*square + at(-1, -1, 6), points, parts)
     call check('shared corners', points%n, 12)
-    call check_net(parts, points, 2, 10, 14.0_wp)
+    call check_parts(parts, points, 2, 10, 14.0_wp)
   end subroutine check_glued
 
   !> Eight cubes in a ring: Euler's formula tells the hole.
@@ -128,37 +129,21 @@ contains
         call add_frustum(square + at(i, j, 0), square + at(i, j, 1), points, parts)
       end do
     end do
-    call check_net(parts, points, 0, 8*4, 8.0_wp)
+    call check_parts(parts, points, 0, 8*4, 8.0_wp)
   end subroutine check_ring
 
-  !> The faces of the surface: corners - edges + faces is Euler's number, each edge belongs to two
-  !! faces that run it both ways, and they enclose the volume.
-  subroutine check_net(parts, points, euler, faces, volume)
+  !> The net of the surface: Euler's number, faces, volume.
+  subroutine check_parts(parts, points, euler, faces, volume)
     type(parts_t), intent(in) :: parts
     type(points_t), intent(in) :: points
     integer, intent(in) :: euler, faces
     real(wp), intent(in) :: volume
     integer, allocatable :: facet(:), corner(:)
-    integer :: net(points%n, points%n), f, k, a, b
-    real(wp) :: total
 
     call net_of_parts(parts, facet, corner)
     call check('faces', size(facet) - 1, faces)
-    net = 0
-    total = 0.0_wp
-    do f = 1, size(facet) - 1
-      do k = facet(f), facet(f + 1) - 1
-        a = corner(k)
-        b = corner(merge(facet(f), k + 1, k + 1 == facet(f + 1)))
-        net(a, b) = net(a, b) + 1
-        total = total + tet_volume(reshape([0*points%x(:, 1), points%x(:, [corner(facet(f)), a, &
-          b])], [3, 4]))
-      end do
-    end do
-    call check('two faces at each edge', all(net <= 1) .and. all(net == transpose(net)))
-    call check('Euler''s number', count(any(net > 0, 2)) - sum(net)/2 + faces, euler)
-    call check('volume', total, volume, 1.0e-14_wp*volume + 1.0e-8_wp*points%same)
-  end subroutine check_net
+    call check_net('parts', points%x(:, :points%n), facet, corner, euler, volume)
+  end subroutine check_parts
 
   !> A shift of four points.
   pure function at(i, j, k) result(shift)

@@ -5,6 +5,7 @@ module test_mass_properties_m
   use case_types_m, only: shape_input_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
+  use surface_nets_m, only: moments_of_net
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin
   implicit none
   private
@@ -88,50 +89,19 @@ contains
     type(shape_t) :: s
     real(wp), parameter :: a = 0.03_wp, want = 0.4_wp*rho*(4*pi/3*a**3)*a**2
     real(wp) :: error(2)
-    integer :: r
+    integer :: r, m
 
     do r = 1, 2
       call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
       call check('sphere: isotropic', flat(s%inertia), &
                  flat(diagonal(spread(s%inertia(1, 1), 1, 3))), 1e-13_wp*want)
-      call check('sphere: inertia by the surface', flat(s%inertia), flat(inertia_of_surface(s)), &
-                 1e-13_wp*want)
+      call by_surface(s, [(1 + 3*m, m=0, size(s%triangle, 2))], &
+                      reshape(s%triangle, [size(s%triangle)]))
       error(r) = s%inertia(1, 1)/want - 1
     end do
     call check('sphere: inertia within 0.1 per cent', abs(error(2)) < 1e-3_wp)
     call check('sphere: fourth order, since the volume is right', abs(error(1)/error(2) - 16) < 2)
   end subroutine sphere
-
-  !> Divergence theorem: integral of x_i^2 dV = surface integral of x_i^3/3 n_i dA (and so on).
-  function inertia_of_surface(s) result(inertia)
-    type(shape_t), intent(in) :: s
-    real(wp) :: inertia(3, 3), second(3, 3), x(3, 3), normal(3), u(3), v(3), y(3)
-    real(wp), parameter :: w(4) = [-27.0_wp, 25.0_wp, 25.0_wp, 25.0_wp]/48.0_wp   ! exact for cubics
-    real(wp), parameter :: b(3, 4) = reshape([1.0_wp/3, 1.0_wp/3, 1.0_wp/3, &
-      0.6_wp, 0.2_wp, 0.2_wp, 0.2_wp, 0.6_wp, 0.2_wp, 0.2_wp, 0.2_wp, 0.6_wp], [3, 4])
-    integer :: t, g, i, j
-
-    second = 0.0_wp
-    do t = 1, size(s%triangle, 2)
-      x = s%point(:, s%triangle(:, t))
-      u = x(:, 2) - x(:, 1)
-      v = x(:, 3) - x(:, 1)
-      normal = 0.5_wp*[u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
-      do g = 1, 4
-        y = matmul(x, b(:, g))
-        do j = 1, 3
-          do i = 1, 3
-            if (i == j) second(i, i) = second(i, i) + w(g)*y(i)**3*normal(i)/3
-            if (i /= j) second(i, j) = second(i, j) + w(g)*0.5_wp*y(i)**2*y(j)*normal(i)
-          end do
-        end do
-      end do
-    end do
-    inertia = -rho*second
-    do i = 1, 3
-      inertia(i, i) = rho*(second(1, 1) + second(2, 2) + second(3, 3) - second(i, i))
-    end do
-  end function inertia_of_surface
 
   !> A shifted mesh: centroid follows, inertia by the parallel axes.
   subroutine moved_block()
@@ -155,13 +125,12 @@ contains
                flat(want), 1e-18_wp)
   end subroutine moved_block
 
-  !> Volumes against closed forms; volume and inertia of every form against integrals over its
-  !! facets by the divergence theorem, which know nothing of tetrahedra.
+  !> Volumes against closed forms; volume and inertia of every form against integrals over facets.
   subroutine built_of_parts()
     type(shape_t) :: s
     real(wp), parameter :: h = 0.06_wp, size_m(3) = [h, 0.1_wp, 0.0_wp]
     character(9), parameter :: kinds(4) = ['cylinder ', 'tetrapod ', 'dolos    ', 'reef_cube']
-    real(wp) :: volume(4), octagon, a, b, inertia(3, 3), total, ix
+    real(wp) :: volume(4), octagon, a, b, ix
     integer :: r, k
 
     ! A dolos: four tapered legs of regular octagons, two stretches of fluke, the shank, and four
@@ -177,10 +146,7 @@ contains
         call build(trim(kinds(k)), size_m, r, s)
         if (k >= 3) call check(trim(kinds(k))//': volume', s%volume, volume(k)*h**3, &
                                1e-14_wp*h**3)
-        call by_surface(s, total, inertia)
-        call check(trim(kinds(k))//': volume by the surface', s%volume, total, 1e-13_wp*total)
-        call check(trim(kinds(k))//': inertia by the surface', flat(s%inertia), flat(inertia), &
-                   1e-13_wp*maxval(inertia))
+        call by_surface(s, s%facet, s%facet_point)
       end do
       call build('cylinder', size_m, r, s)
       call check('cylinder: volume', s%volume, 0.25_wp*pi*h**2*size_m(2), 1e-14_wp*h**3)
@@ -193,33 +159,17 @@ contains
     end do
   end subroutine built_of_parts
 
-  !> Volume and inertia of a block from its facets: with div(x f) = (3 + m) f for f of degree m,
-  !! V = 1/3 sum (x.n) A and int x x^T dV = 1/5 sum (x.n) int x x^T dA.
-  subroutine by_surface(s, volume, inertia)
+  !> Volume and inertia of a block from the polygons of its surface, which know nothing of
+  !! tetrahedra.
+  subroutine by_surface(s, facet, corner)
     type(shape_t), intent(in) :: s
-    real(wp), intent(out) :: volume, inertia(3, 3)
-    real(wp) :: x(3, 3), c(3), second(3, 3), height_area
-    integer :: m, k, i, j
+    integer, intent(in) :: facet(:), corner(:)
+    real(wp) :: volume, second(3, 3), inertia(3, 3)
 
-    volume = 0.0_wp
-    second = 0.0_wp
-    do m = 1, size(s%facet) - 1
-      do k = s%facet(m) + 1, s%facet(m + 1) - 2
-        x = s%point(:, s%facet_point([s%facet(m), k, k + 1]))
-        c = sum(x, 2)
-        height_area = (x(1, 1)*(x(2, 2)*x(3, 3) - x(3, 2)*x(2, 3)) &
-          + x(2, 1)*(x(3, 2)*x(1, 3) - x(1, 2)*x(3, 3)) &
-          + x(3, 1)*(x(1, 2)*x(2, 3) - x(2, 2)*x(1, 3)))/2
-        volume = volume + height_area/3
-        do j = 1, 3
-          do i = 1, 3
-            second(i, j) = second(i, j) + height_area/60*(dot_product(x(i, :), x(j, :)) &
-              + c(i)*c(j))
-          end do
-        end do
-      end do
-    end do
+    call moments_of_net(s%point, facet, corner, volume, second)
     inertia = rho*(diagonal(spread(second(1, 1) + second(2, 2) + second(3, 3), 1, 3)) - second)
+    call check('volume by the surface', s%volume, volume, 1e-13_wp*volume)
+    call check('inertia by the surface', flat(s%inertia), flat(inertia), 1e-13_wp*maxval(inertia))
   end subroutine by_surface
 
   !> The volume goes to that of four cones around the hull of their roots, with the square of the

@@ -6,6 +6,7 @@ module test_shape_file_m
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_volume
   use shapes_builtin_m, only: make_shape
+  use surface_nets_m, only: check_net
   implicit none
   private
   public :: test_shape_file
@@ -168,10 +169,7 @@ contains
     character(:), allocatable :: message
     character(9), parameter :: kinds(3) = ['dolos    ', 'reef_cube', 'hexapod  ']
     type(shape_input_t) :: input
-    real(wp) :: x(3, 4), total, normal(3), u(3), v(3)
-    integer, allocatable :: net(:, :)
-    integer :: i, m, k, n, a, b
-    logical :: bent, once
+    integer :: i
 
     do i = 1, 3
       input%kind = kinds(i)
@@ -179,44 +177,8 @@ contains
       call make_shape(input, s, message)
       call write_own('own', s)
       call read_file('own', 1.0e-3_wp, s, message)
-      n = size(s%point, 2)
-      if (allocated(net)) deallocate (net)
-      allocate (net(n, n), source=0)
-      total = 0.0_wp
-      bent = .true.
-      do m = 1, size(s%facet) - 1
-        associate (c => s%facet_point(s%facet(m):s%facet(m + 1) - 1))
-          normal = 0.0_wp
-          do k = 2, size(c) - 1
-            x(:, 1) = 0.0_wp
-            x(:, 2:4) = s%point(:, c([1, k, k + 1]))
-            total = total + tet_volume(x)
-            normal = normal + turn(x(:, 3) - x(:, 2), x(:, 4) - x(:, 2))
-          end do
-          do k = 1, size(c)
-            a = c(k)
-            b = c(1 + mod(k, size(c)))
-            u = s%point(:, b) - s%point(:, a)
-            v = s%point(:, c(1 + mod(k + 1, size(c)))) - s%point(:, b)
-            bent = bent .and. dot_product(turn(u, v), normal) &
-              > 1e-6_wp*norm2(u)*norm2(v)*norm2(normal)
-            net(a, b) = net(a, b) + 1
-          end do
-        end associate
-      end do
-      once = all(net <= 1) .and. all(net == transpose(net))
-      call check(trim(kinds(i))//': each edge joins two facets', once)
-      call check(trim(kinds(i))//': facets bend at every corner', bent)
-      call check(trim(kinds(i))//': facets enclose the volume', total, s%volume, &
-                 1e-13_wp*s%volume)
+      call check_net(trim(kinds(i)), s%point, s%facet, s%facet_point, volume=s%volume)
     end do
   end subroutine merged_net
-
-  pure function turn(u, v) result(w)
-    real(wp), intent(in) :: u(3), v(3)
-    real(wp) :: w(3)
-
-    w = [u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
-  end function turn
 
 end module test_shape_file_m

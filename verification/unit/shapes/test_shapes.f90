@@ -6,6 +6,7 @@ module test_shapes_m
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_volume
   use shapes_builtin_m, only: make_shape
+  use surface_nets_m, only: check_net
   implicit none
   private
   public :: test_shapes
@@ -28,11 +29,11 @@ contains
       if (r == 4) cycle
       call check_kind('dolos', [0.06_wp, 0.0_wp, 0.0_wp], r, -1)
       call check_kind('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, -1)
+      call reef_cube_sizes()
     end do
     call hexapod_sizes()
     call hexapod_symmetry()
     call sphere_sizes()
-    call armour_sizes()
     call refusals()
   end subroutine test_shapes
 
@@ -58,8 +59,8 @@ contains
     real(wp), intent(in) :: size_m(3)
     integer, intent(in) :: refinement, n_spheres
     type(shape_t) :: s
-    real(wp) :: area(3), total, smallest, flow_total, x(3, 4)
-    integer :: t, m, k
+    real(wp) :: total, smallest, flow_total
+    integer :: t, m
 
     call build(kind, size_m, refinement, s)
     smallest = huge(1.0_wp)
@@ -81,37 +82,10 @@ contains
                1e-14_wp*s%volume)
     call check(kind//': and have positive volume', smallest > 1e-6_wp*s%volume)
 
-    area = 0.0_wp
-    total = 0.0_wp
-    do t = 1, size(s%triangle, 2)
-      x(:, 1) = 0.0_wp
-      x(:, 2:4) = s%point(:, s%triangle(:, t))
-      total = total + tet_volume(x)
-      area = area + area_vector(x(:, 2:4))
-    end do
-    call check(kind//': the surface is closed', area, [0.0_wp, 0.0_wp, 0.0_wp], 1e-17_wp)
-    call check(kind//': the surface encloses the volume', total, s%volume, &
-               epsilon(1.0_wp)*real(size(s%triangle, 2) + 100, wp)*s%volume)
+    call check_net(kind//', triangles', s%point, [(1 + 3*m, m=0, size(s%triangle, 2))], &
+                   reshape(s%triangle, [size(s%triangle)]), volume=s%volume)
+    call check_net(kind//', facets', s%point, s%facet, s%facet_point, volume=s%volume)
     call check(kind//': each surface triangle is a face of its tetrahedron', faces_match(s))
-
-    area = 0.0_wp
-    total = 0.0_wp
-    do m = 1, size(s%facet) - 1
-      do k = s%facet(m) + 1, s%facet(m + 1) - 2
-        x(:, 1) = 0.0_wp
-        x(:, 2:4) = s%point(:, s%facet_point([s%facet(m), k, k + 1]))
-        total = total + tet_volume(x)
-        area = area + area_vector(x(:, 2:4))
-      end do
-    end do
-    call check(kind//': the facets are closed', area, [0.0_wp, 0.0_wp, 0.0_wp], 1e-17_wp)
-    call check(kind//': the facets enclose the volume', total, s%volume, 1e-13_wp*s%volume)
-    call check(kind//': each edge of the facets joins two of them', &
-               edges_paired(s, s%facet, s%facet_point))
-    call check(kind//': facets are flat and bend at every corner', all([(flat_and_convex( &
-      s%point(:, s%facet_point(s%facet(m):s%facet(m + 1) - 1))), m=1, size(s%facet) - 1)]))
-    call check(kind//': the surface has two triangles at every edge', edges_paired(s, &
-      [(1 + 3*m, m=0, size(s%triangle, 2))], reshape(s%triangle, [size(s%triangle)])))
     call check(kind//': the centroid is the origin', weighted_centroid(s), &
                [0.0_wp, 0.0_wp, 0.0_wp], 1e-15_wp)
     call check(kind//': the radius holds all corners', all(norm2(s%point, 1) <= s%radius))
@@ -140,15 +114,6 @@ contains
                good .and. m == size(s%sphere_radius))
   end subroutine check_spheres
 
-  pure function area_vector(x) result(a)
-    real(wp), intent(in) :: x(3, 3)
-    real(wp) :: a(3), u(3), v(3)
-
-    u = x(:, 2) - x(:, 1)
-    v = x(:, 3) - x(:, 1)
-    a = 0.5_wp*[u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
-  end function area_vector
-
   pure function weighted_centroid(s) result(x)
     type(shape_t), intent(in) :: s
     real(wp) :: x(3)
@@ -172,51 +137,6 @@ contains
       end do
     end do
   end function faces_match
-
-  !> Is a polygon flat, and is each of its corners a true one, turned the same way?
-  pure function flat_and_convex(x) result(good)
-    real(wp), intent(in) :: x(:, :)
-    logical :: good
-    real(wp) :: normal(3), u(3), v(3)
-    integer :: k, m
-
-    m = size(x, 2)
-    normal = 0.0_wp
-    do k = 2, m - 1
-      normal = normal + area_vector(x(:, [1, k, k + 1]))
-    end do
-    normal = normal/norm2(normal)
-    good = m >= 3
-    do k = 1, m
-      good = good .and. abs(dot_product(x(:, k) - x(:, 1), normal)) < 1e-14_wp
-      u = x(:, 1 + mod(k, m)) - x(:, k)
-      v = x(:, 1 + mod(k + 1, m)) - x(:, 1 + mod(k, m))
-      good = good .and. dot_product(area_vector(reshape([0*u, u, u + v], [3, 3])), normal) &
-        > 1e-4_wp*norm2(u)*norm2(v)
-    end do
-  end function flat_and_convex
-
-  !> Every directed edge of the polygons is met exactly once the other way round.
-  pure function edges_paired(s, facet, facet_point) result(good)
-    type(shape_t), intent(in) :: s
-    integer, intent(in) :: facet(:), facet_point(:)
-    logical :: good
-    integer, allocatable :: net(:, :)
-    integer :: m, k, a, b, n
-
-    n = size(s%point, 2)
-    allocate (net(n, n), source=0)
-    good = .true.
-    do m = 1, size(facet) - 1
-      do k = facet(m), facet(m + 1) - 1
-        a = facet_point(k)
-        b = facet_point(merge(facet(m), k + 1, k == facet(m + 1) - 1))
-        net(a, b) = net(a, b) + 1
-        good = good .and. net(a, b) == 1
-      end do
-    end do
-    good = good .and. all(net == transpose(net))
-  end function edges_paired
 
   subroutine hexapod_sizes()
     type(shape_t) :: s
@@ -278,32 +198,15 @@ contains
     call check('sphere: second order in the refinement', outside(1)/outside(2), 4.0_wp, 0.1_wp)
   end subroutine sphere_sizes
 
-  !> Overall sizes, and facets as few as the forms have.
-  subroutine armour_sizes()
+  !> Eight rectangles around each window, and its four sides.
+  subroutine reef_cube_sizes()
     type(shape_t) :: s
-    real(wp) :: extent(3)
-    integer :: r
 
-    do r = 1, 3
-      call build('tetrapod', [0.06_wp, 0.0_wp, 0.0_wp], r, s)
-      extent = maxval(s%point, 2) - minval(s%point, 2)
-      call check('tetrapod: overall height', extent(3), 0.06_wp, 1e-15_wp)
-      call check('tetrapod: stands on three corners', &
-        count(abs(s%point(3, :) - minval(s%point(3, :))) < 1e-12_wp), 3)
-      call build('dolos', [0.06_wp, 0.0_wp, 0.0_wp], r, s)
-      call check('dolos: as long as high and wide', maxval(s%point, 2) - minval(s%point, 2), &
-                 [0.06_wp, 0.06_wp, 0.06_wp], 1e-15_wp)
-      call build('cylinder', [0.03_wp, 0.05_wp, 0.0_wp], r, s)
-      extent = maxval(s%point, 2) - minval(s%point, 2)
-      call check('cylinder: height', extent(3), 0.05_wp, 1e-15_wp)
-      call check('cylinder: two ends and 6 r sides', size(s%facet) - 1, 2 + 6*r)
-      call build('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, s)
-      call check('reef cube: eight rectangles around each window, and its four sides', &
-                 size(s%facet) - 1, 72)
-      call check('reef cube: edges', maxval(s%point, 2) - minval(s%point, 2), &
-                 [0.05_wp, 0.05_wp, 0.05_wp], 1e-15_wp)
-    end do
-  end subroutine armour_sizes
+    call build('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, s)
+    call check('reef cube: facets', size(s%facet) - 1, 72)
+    call check('reef cube: edges', maxval(s%point, 2) - minval(s%point, 2), spread(0.05_wp, 1, 3), &
+               1e-15_wp)
+  end subroutine reef_cube_sizes
 
   subroutine refusals()
     type(shape_input_t) :: input

@@ -3,8 +3,8 @@
 module test_surface_net_m
   use kinds_m, only: wp
   use check_m, only: check
-  use vectors_m, only: cross
   use surface_net_m, only: merge_flat_facets, edge_twins
+  use surface_nets_m, only: check_net
   implicit none
   private
   public :: test_surface_net
@@ -38,7 +38,7 @@ contains
     do k = 1, 2
       call make_net(full, k == 2, net)
       call merge_flat_facets(net%point, net%facet, net%corner)
-      call check_net(net, 2, 18.0_wp, 42.0_wp)
+      call check_net('cuboid', net%point, net%facet, net%corner, 2, 18.0_wp, 42.0_wp)
       call check('six rectangles', size(net%facet) - 1, 6)
       call check('of four corners', size(net%corner), 24)
     end do
@@ -57,7 +57,7 @@ contains
     do k = 1, 2
       call make_net(full, k == 2, net)
       call merge_flat_facets(net%point, net%facet, net%corner)
-      call check_net(net, 2, 3.0_wp, 14.0_wp)
+      call check_net('L', net%point, net%facet, net%corner, 2, 3.0_wp, 14.0_wp)
       call check('six sides and two L', size(net%facet) - 1 >= 6 + 2*2)
       call check('few polygons', size(net%facet) - 1 <= 14)
     end do
@@ -73,7 +73,7 @@ contains
     full(2, 2, 1) = .false.
     call make_net(full, .true., net)
     call merge_flat_facets(net%point, net%facet, net%corner)
-    call check_net(net, 0, 8.0_wp, 32.0_wp)
+    call check_net('ring', net%point, net%facet, net%corner, 0, 8.0_wp, 32.0_wp)
     call check('fewer polygons', size(net%facet) - 1 < 32)
   end subroutine check_ring
 
@@ -115,50 +115,6 @@ contains
     call edge_twins(net%facet, net%corner, twin)
     call check('two cubes touch at an edge', count(twin == 0), 4)
   end subroutine check_twins
-
-  !> A net whose edges join two polygons each, which are flat and bend at every corner: Euler's
-  !! number, volume and area.
-  subroutine check_net(net, euler, volume, area)
-    type(net_t), intent(in) :: net
-    integer, intent(in) :: euler
-    real(wp), intent(in) :: volume, area
-    integer :: pairs((n + 1)**3, (n + 1)**3), f, k, a, b, c, m
-    real(wp) :: twice(3), total, sum_area
-    logical :: bends, flat
-
-    pairs = 0
-    total = 0.0_wp
-    sum_area = 0.0_wp
-    bends = .true.
-    flat = .true.
-    do f = 1, size(net%facet) - 1
-      associate (corner => net%corner(net%facet(f):net%facet(f + 1) - 1))
-        m = size(corner)
-        twice = 0.0_wp
-        do k = 1, m
-          twice = twice + cross(net%point(:, corner(k)), net%point(:, corner(1 + mod(k, m))))
-        end do
-        do k = 1, m
-          a = corner(k)
-          b = corner(1 + mod(k, m))
-          c = corner(1 + mod(k + 1, m))
-          pairs(a, b) = pairs(a, b) + 1
-          flat = flat .and. abs(dot_product(twice, net%point(:, b) - net%point(:, a))) < 1.0e-12_wp
-          bends = bends .and. dot_product(twice, cross(net%point(:, b) - net%point(:, a), &
-            net%point(:, c) - net%point(:, b))) > 1.0e-12_wp
-        end do
-        total = total + dot_product(twice, net%point(:, corner(1)))/6
-        sum_area = sum_area + norm2(twice)/2
-      end associate
-    end do
-    call check('two polygons at each edge', all(pairs <= 1) .and. all(pairs == transpose(pairs)))
-    call check('flat', flat)
-    call check('bent at every corner', bends)
-    call check('Euler''s number', count(any(pairs > 0, 2)) - sum(pairs)/2 + size(net%facet) - 1, &
-      euler)
-    call check('volume', total, volume, 1.0e-13_wp*volume)
-    call check('area', sum_area, area, 1.0e-13_wp*area)
-  end subroutine check_net
 
   !> The surface of cubes, a square for each free side or two triangles.
   subroutine make_net(full, triangles, net)
