@@ -1,20 +1,24 @@
 !> A fluid at rest around one block: everything that a test of the coupling needs.
 module one_body_m
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
+  use errors_m, only: problems_t
   use case_types_m, only: case_t
+  use case_check_m, only: make_shapes
+  use case_text_m, only: case_of
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t
   use case_blocks_m, only: blocks_init
   use coupling_m, only: copy_motion
   implicit none
   private
-  public :: one_body_t, describe, place, wall_at, layer, random_numbers
+  public :: one_body_t, place, wall_at, layer, random_numbers, random_field
 
   type :: one_body_t
     type(case_t) :: case
@@ -26,50 +30,51 @@ module one_body_m
     type(rigid_motion_t) :: bodies
   end type one_body_t
 
+  !> Put the block of a text or of a case into liquid that is everywhere.
+  interface place
+    procedure :: place_text, place_case
+  end interface place
+
 contains
 
-  !> A case with one block; the caller may change what it likes before `place`.
-  subroutine describe(cells, length, sides, kind, size, position, case)
-    integer, intent(in) :: cells(3)
-    real(wp), intent(in) :: length(3)                !! [m]
-    character(*), intent(in) :: sides(2, 3)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), position(3)     !! of the block [m]
-    type(case_t), intent(out) :: case
+  subroutine place_text(text, self, merged)
+    character(*), intent(in) :: text
+    type(one_body_t), intent(out) :: self
+    type(merged_cells_t), intent(out), optional :: merged
 
-    case%grid%cells = cells
-    case%grid%length = length
-    case%boundary%kind = sides
-    allocate (case%shape(1), case%body(1), case%drop(0), case%water(0))
-    case%shape(1)%name = kind
-    case%shape(1)%kind = kind
-    case%shape(1)%size = size
-    case%body(1)%shape = kind
-    case%body(1)%position = position
-  end subroutine describe
+    call place_case(case_of(text), self, merged)
+  end subroutine place_text
 
-  !> Grid, block and solids of `self%case`; the fluid is liquid everywhere.
-  subroutine place(self)
-    type(one_body_t), intent(inout) :: self
-    type(shape_t) :: shapes(1)
-    character(:), allocatable :: message
+  subroutine place_case(case, self, merged)
+    type(case_t), intent(in) :: case
+    type(one_body_t), intent(out) :: self
+    type(merged_cells_t), intent(out), optional :: merged   !! cells at the walls of the block
+    type(shape_t), allocatable :: shapes(:)
+    type(problems_t) :: problems
 
-    call grid_init(self%case%grid, self%case%boundary, self%grid)
-    call make_shape(self%case%shape(1), shapes(1), message)
-    if (message /= '') error stop 'one_body_m: the shape cannot be built'
-    call blocks_init(self%case, shapes, self%blocks)
+    self%case = case
+    call make_shapes(case, shapes, problems)
+    call problems%report(error_unit)
+    if (problems%n > 0) error stop 'one_body_m: the shape is refused'
+    call grid_init(case%grid, case%boundary, self%grid)
+    call blocks_init(case, shapes, self%blocks)
     call flow_init(self%grid, self%flow)
     self%flow%c = 1.0_wp
-    self%flow%rho = self%case%fluid%liquid_density
-    self%flow%mu = self%case%fluid%liquid_viscosity
+    self%flow%rho = case%fluid%liquid_density
+    self%flow%mu = case%fluid%liquid_viscosity
     call solid_geometry_init(self%grid, self%solid, self%blocks%n)
     call solid_fraction_init(self%grid, self%blocks, self%fraction)
     call update_solid(self%fraction, self%grid, self%blocks, self%solid)
+    self%flow%fluid_volume = self%grid%volume*(1.0_wp - self%solid%alpha)
+    self%flow%liquid = self%flow%fluid_volume
     call rigid_motion_init(self%blocks%n, self%bodies)
     call copy_motion(self%blocks, self%bodies)
-  end subroutine place
+    if (.not. present(merged)) return
+    call merged_cells_init(self%grid, merged)
+    call find_merged_cells(self%grid, self%solid, merged)
+  end subroutine place_case
 
-  !> Velocity of the block, once placed, at the centre of a cell [m/s].
+  !> Velocity of the block at the centre of a cell [m/s].
   function wall_at(self, cell) result(velocity)
     type(one_body_t), intent(in) :: self
     integer, intent(in) :: cell(3)
@@ -99,5 +104,19 @@ contains
       a(m) = 2.0_wp*real(seed, wp)/2147483647.0_wp - 1.0_wp
     end do
   end subroutine random_numbers
+
+  subroutine random_field(seed, a)
+    integer, intent(inout) :: seed
+    real(wp), intent(out) :: a(:, :, :, :)
+    integer :: j, k, d
+
+    do d = 1, size(a, 4)
+      do k = 1, size(a, 3)
+        do j = 1, size(a, 2)
+          call random_numbers(seed, a(:, j, k, d))
+        end do
+      end do
+    end do
+  end subroutine random_field
 
 end module one_body_m

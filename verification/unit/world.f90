@@ -2,9 +2,9 @@
 module world_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
-  use errors_m, only: problems_t, to_text
+  use errors_m, only: problems_t
   use case_types_m, only: case_t
-  use case_input_m, only: read_case
+  use case_text_m, only: case_of, body
   use tet_mesh_m, only: shape_t
   use case_check_m, only: make_shapes
   use bed_m, only: bed_t, make_bed
@@ -32,7 +32,7 @@ contains
     type(case_t) :: case
     type(problems_t) :: problems
 
-    call read_case(text, case, problems)
+    case = case_of(text)
     call make_shapes(case, world%shapes, problems)
     call make_bed(case, world%bed, problems)
     call problems%report(error_unit)
@@ -74,21 +74,5 @@ contains
                        world%contact)
     end do
   end subroutine move
-
-  !> A group &body at x that moves with v.
-  function body(shape, x, v, q, more) result(text)
-    character(*), intent(in) :: shape
-    real(wp), intent(in) :: x(3)               !! [m]
-    real(wp), intent(in), optional :: v(3)     !! [m/s]
-    real(wp), intent(in), optional :: q(4)     !! attitude
-    character(*), intent(in), optional :: more
-    character(:), allocatable :: text
-
-    text = '&body shape="'//shape//'" position='//to_text(x)
-    if (present(v)) text = text//' velocity='//to_text(v)
-    if (present(q)) text = text//' quaternion='//to_text(q)
-    if (present(more)) text = text//' '//more
-    text = text//'/ '
-  end function body
 
 end module world_m

@@ -2,24 +2,21 @@
 module test_added_mass_m
   use kinds_m, only: wp
   use added_mass_m, only: update_added_mass
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_added_mass
 
-  character(8), parameter :: sides(2, 3) = 'slip'
-  real(wp), parameter :: length(3) = [0.12_wp, 0.12_wp, 0.12_wp]   !! [m]
   type(one_body_t) :: block
   real(wp) :: displaced, weight
 
 contains
 
   subroutine test_added_mass()
-    call describe([12, 12, 12], length, sides, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], &
-                  0.5_wp*length, block%case)
-    block%case%shape(1)%density = 2500.0_wp
-    call place(block)
+    call place('&grid cells=3*12 length=3*.12/ &shape name="h" kind="hexapod" size=.02 ' &
+               //'density=2500/ &body shape="h" position=3*.06/ '//slip, block)
     displaced = block%case%fluid%liquid_density*block%bodies%volume(1)
     weight = block%blocks%mass(1)*norm2(block%case%fluid%gravity)
 

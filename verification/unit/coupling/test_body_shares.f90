@@ -8,13 +8,14 @@ module test_body_shares_m
   use body_shares_m, only: find_body_shares
   use cut_tets_m, only: cut_tets_t, list_cut_tets, faces_of_tet
   use subcell_shares_m, only: subcell_work_t, count_subcells
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip, body_at => body
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_body_shares
 
-  character(8), parameter :: sides(2, 3) = 'slip'
+  character(*), parameter :: tank = '&grid cells=14,15,13 length=.07,.09,.065/ '//slip
   real(wp), parameter :: position(3) = [0.0341_wp, 0.0437_wp, 0.0329_wp]
   type(one_body_t) :: block
   type(share_row_t) :: row
@@ -57,10 +58,8 @@ contains
     real(wp) :: volume, first(3)
     integer :: m
 
-    call describe([14, 15, 13], [0.07_wp, 0.09_wp, 0.065_wp], sides, 'hexapod', &
-                  [0.02_wp, 0.0_wp, 0.0_wp], position, block%case)
-    block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 0.7_wp)
-    call place(block)
+    call place(tank//'&shape name="h" kind="hexapod" size=.02/ '//body_at('h', position, &
+               q=quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 0.7_wp)), block)
     associate (grid => block%grid, shape => block%blocks%shapes(1), q => block%blocks%q(:, 1))
       call find_body_shares(grid, shape, position, q, row, body, changed)
       call check('found', changed)
@@ -112,9 +111,8 @@ contains
     integer :: n_face
 
     body = body_shares_t()
-    call describe([14, 15, 13], [0.07_wp, 0.09_wp, 0.065_wp], sides, 'box', &
-                  [0.02_wp, 0.018_wp, 0.015_wp], [0.03_wp, 0.039_wp, 0.0325_wp], block%case)
-    call place(block)
+    call place(tank//'&shape name="b" kind="box" size=.02,.018,.015/ &body shape="b" ' &
+               //'position=.03,.039,.0325/', block)
     call find_body_shares(block%grid, block%blocks%shapes(1), block%blocks%x(:, 1), &
                           block%blocks%q(:, 1), row, body, changed)
     call list_cut_tets(tets, body)

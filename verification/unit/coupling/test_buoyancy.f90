@@ -8,14 +8,14 @@ module test_buoyancy_m
   use polyhedron_m, only: box_clip_moments_below
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
   use buoyancy_m, only: displaced_force, mass_defect
-  use one_body_m, only: one_body_t, describe, place
+  use errors_m, only: to_text
+  use case_text_m, only: sides, body
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_buoyancy
 
-  character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
-    'slip', 'slip', 'periodic', 'periodic', 'slip', 'open'], [2, 3])
   integer, parameter :: cells(3) = [16, 12, 18]
   real(wp), parameter :: length(3) = [0.16_wp, 0.12_wp, 0.18_wp]   !! [m]
   real(wp), parameter :: level = 0.0913_wp                         !! inside a cell [m]
@@ -24,7 +24,7 @@ module test_buoyancy_m
 contains
 
   subroutine test_buoyancy()
-    call submerged('hexapod', [0.03_wp, 0.0_wp, 0.0_wp], [0.0771_wp, 0.0611_wp, 0.0829_wp])
+    call submerged('hexapod', [0.03_wp], [0.0771_wp, 0.0611_wp, 0.0829_wp])
     call submerged('box', [0.05_wp, 0.031_wp, 0.043_wp], [0.0771_wp, 0.0037_wp, 0.0829_wp])
     call floating_box()
     call through_the_level([0.0771_wp, 0.0611_wp, 0.0887_wp])
@@ -34,14 +34,12 @@ contains
   !> A block, turned by an angle, in still liquid up to a level.
   subroutine build(kind, size, position, angle, height)
     character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), position(3), angle, height
+    real(wp), intent(in) :: size(:), position(3), angle, height
     integer :: k
-    type(one_body_t) :: fresh
 
-    block = fresh
-    call describe(cells, length, tank, kind, size, position, block%case)
-    block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.4_wp, 0.3_wp], angle)
-    call place(block)
+    call place('&grid cells=16,12,18 length=.16,.12,.18/ '//sides('slip slip periodic periodic ' &
+      //'slip open')//'&shape name="b" kind="'//kind//'" size='//to_text(size)//'/ ' &
+      //body('b', position, q=quaternion_from_axis([1.0_wp, -0.4_wp, 0.3_wp], angle)), block)
     do k = 1 - n_halo, cells(3) + n_halo
       block%flow%c(:, :, k) = min(max((height - block%grid%face(k, 3))/block%grid%h(3), 0.0_wp), &
                                   1.0_wp)
@@ -53,7 +51,7 @@ contains
   !> All liquid: -rho V g whatever the pose, the direction of gravity and the period; no torque.
   subroutine submerged(kind, size, position)
     character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), position(3)
+    real(wp), intent(in) :: size(:), position(3)
     real(wp) :: force(6, 1), weight(3)
 
     call build(kind, size, position, 0.6_wp, 1.0_wp)
@@ -98,7 +96,7 @@ contains
     real(wp) :: mass, moment(3), turn(3, 3), corner(3, 4)
     integer :: t
 
-    call build('hexapod', [0.03_wp, 0.0_wp, 0.0_wp], position, 0.8_wp, level)
+    call build('hexapod', [0.03_wp], position, 0.8_wp, level)
     associate (fluid => block%case%fluid, solid => block%solid)
       mass = fluid%gas_density*block%bodies%volume(1)
       moment = 0.0_wp

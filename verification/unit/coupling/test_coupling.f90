@@ -1,6 +1,7 @@
 !> One monolithic step of a free block in liquid: momentum, divergence, added mass, free fall.
 module test_coupling_m
   use kinds_m, only: wp
+  use errors_m, only: to_text
   use vectors_m, only: quaternion_from_axis
   use rigid_body_m, only: begin_step
   use scratch_m, only: scratch_t, scratch_init
@@ -10,15 +11,16 @@ module test_coupling_m
   use rigid_motion_m, only: set_inertia
   use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
   use boundary_m, only: fill_velocity_halo
-  use one_body_m, only: one_body_t, describe, place
+  use case_types_m, only: case_t
+  use case_text_m, only: case_of, sides, body
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_coupling
 
-  character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
-    'slip', 'slip', 'slip', 'slip', 'slip', 'open'], [2, 3])
   real(wp), parameter :: dt = 1.0e-3_wp, g = 9.81_wp
+  type(case_t) :: case
   type(one_body_t), target :: block
   type(monolithic_t) :: coupling
   type(coupling_report_t) :: report
@@ -28,17 +30,13 @@ module test_coupling_m
 contains
 
   subroutine test_coupling()
-    call released_sphere(2.3_wp)
-    call released_sphere(1.1_wp)
     call let_go(2.3_wp)
     call let_go(0.1_wp)
     call moving_box()
-    call held_box()
-    call block_of_water()
     call block_at_rest()
-    call fall_together('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
-    call fall_together('box', [0.043_wp, 0.031_wp, 0.037_wp], 600.0_wp)
-    call fall_together('sphere', [0.05_wp, 0.0_wp, 0.0_wp], 2300.0_wp, across_the_corner=.true.)
+    call fall_together('kind="hexapod" size=.02', 2300.0_wp)
+    call fall_together('kind="box" size=.043,.031,.037', 600.0_wp)
+    call fall_together('kind="sphere" size=.05', 2300.0_wp, across_the_corner=.true.)
     call wherever_it_lies()
     call momentum_kept('in the open', spread(0.06_wp, 1, 3))
     call momentum_kept('at a wall', [0.033_wp, 0.06_wp, 0.06_wp])   ! it turns
@@ -48,35 +46,30 @@ contains
   end subroutine test_coupling
 
   !> A block in the middle of a tank full of liquid that is at rest, pressure in balance.
-  subroutine build(cells, kind, size, density)
+  subroutine build(cells, shape, density)
     integer, intent(in) :: cells
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), density
-    type(one_body_t) :: fresh
+    character(*), intent(in) :: shape   !! variables of &shape
+    real(wp), intent(in) :: density
 
-    block = fresh
-    call describe(spread(cells, 1, 3), spread(0.01_wp*cells, 1, 3), tank, kind, size, &
-                  spread(0.005_wp*cells, 1, 3) + [0.0013_wp, -0.0007_wp, 0.0021_wp], block%case)
-    block%case%run%dt = dt
-    block%case%fluid%single_phase = .true.
-    block%case%fluid%liquid_density = 1000.0_wp
-    block%case%shape(1)%density = density
-    block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
-    block%case%numerics%divergence_tolerance = 1.0e-8_wp
+    case = case_of('&run t_end=1 dt=1e-3/ &grid cells=3*'//to_text(cells)//' length=3*' &
+      //to_text(0.01_wp*cells)//'/ &fluid single_phase=T liquid_density=1000/ &numerics ' &
+      //'divergence_tolerance=1e-8/ &shape name="b" '//shape//' density='//to_text(density)//'/ ' &
+      //sides('slip slip slip slip slip open')//body('b', spread(0.005_wp*cells, 1, 3) &
+      + [0.0013_wp, -0.0007_wp, 0.0021_wp], q=quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], &
+      0.7_wp)))
   end subroutine build
 
   subroutine ready()
     logical :: converged
 
-    call place(block)
-    block%flow%fluid_volume = (1.0_wp - block%solid%alpha)*block%grid%volume
-    block%flow%liquid = block%flow%fluid_volume
+    call place(case, block)
     call scratch_init(block%grid, scratch)
-    call monolithic_init(block%grid, 1, block%case, coupling)
+    call monolithic_init(block%grid, 1, case, coupling)
     call copy_motion(block%blocks, coupling%bodies)
     call start_flow(stage(), coupling, converged)
     call check('the start converged', converged)
     call fill_velocity_halo(block%grid, block%flow%u)
+    call begin_step(block%blocks)
   end subroutine ready
 
   function stage() result(s)
@@ -92,9 +85,9 @@ contains
 
   !> The stages of a step after the transport, of which `begin` may have gone before.
   subroutine advance()
-    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call start_of_stages(case%fluid%gravity, dt, block%blocks, coupling)
     call stages()
-    call motion_after_fluid(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call motion_after_fluid(case%fluid%gravity, dt, block%blocks, coupling)
     call coupling%close(stage(), block%blocks, report)
   end subroutine advance
 
@@ -124,7 +117,7 @@ contains
     real(wp) :: force(6, 1), a(3), expected
     real(wp), allocatable :: p(:, :, :), uf(:, :, :, :)
 
-    call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
+    call build(16, 'kind="sphere" size=.05', 1000.0_wp*s)
     call ready()
     allocate (p, source=block%flow%p)
     allocate (uf, source=block%flow%uf)
@@ -142,45 +135,21 @@ contains
     if (s < 1.0_wp) return   ! 12 cells instead of 5 are needed: case free_sphere
     block%blocks%fluid_force(:, 1) = force(1:3, 1)
     block%blocks%fluid_torque(:, 1) = force(4:6, 1)
-    call begin_step(block%blocks)
     call begin()
     call advance()
     call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
                0.02_wp*abs(expected))
   end subroutine let_go
 
-  !> A sphere let go falls by a/g = (s - 1)/(s + Ca) with Ca = 1/2, a few per cent more in a tank of
-  !! 16/5 diameters.
-  subroutine released_sphere(s)
-    real(wp), intent(in) :: s   !! density ratio
-    real(wp) :: a(3), force(3)
-
-    call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
-    call ready()
-    call begin_step(block%blocks)
-    call advance()
-    a = block%blocks%v(:, 1)/dt
-    force = block%blocks%fluid_force(:, 1) - block%blocks%mass(1)*[0.0_wp, 0.0_wp, g]
-    call check('sphere: converged', report%pressure%converged .and. report%viscous_converged)
-    call check('sphere: divergence', report%pressure%divergence < 1.0e-8_wp)
-    call check('sphere: M a is fluid force and weight', force, block%blocks%mass(1)*a, &
-               1.0e-13_wp*block%blocks%mass(1)*g)
-    call check('sphere: acceleration', -a(3)/g, (s - 1.0_wp)/(s + 0.5_wp), &
-               0.02_wp*(s - 1.0_wp)/(s + 0.5_wp))
-    print '(a, 2f8.4)', 'sphere: a/g and without walls ', -a(3)/g, (s - 1.0_wp)/(s + 0.5_wp)
-    call check('sphere: hardly sideways', norm2(a(1:2)) < 2.0e-3_wp*g)
-  end subroutine released_sphere
-
   !> A box that moves and spins: the motion found with the pressure is that of the forces.
   subroutine moving_box()
     real(wp) :: motion(6), gain(6), arm(3)
 
-    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
-    block%case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
-    block%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
+    call build(12, 'kind="box" size=.043,.031,.037', 1700.0_wp)
+    case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
+    case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
     call ready()
-    call begin_step(block%blocks)
-    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call start_of_stages(case%fluid%gravity, dt, block%blocks, coupling)
     motion = coupling%bodies%motion(:, 1)
     coupling%at_start = coupling%bodies
     call stages()
@@ -201,41 +170,11 @@ contains
                - coupling%bodies%motion(6, 1)*arm(2), 1.0e-14_wp)
   end subroutine moving_box
 
-  !> Around a held box still water stays still, and carries it by Archimedes' force.
-  subroutine held_box()
-    real(wp) :: weight
-
-    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
-    block%case%body(1)%fixed = .true.
-    call ready()
-    call begin_step(block%blocks)
-    call advance()
-    weight = 1000.0_wp*g*product([0.043_wp, 0.031_wp, 0.037_wp])
-    call check('held box: buoyancy', block%blocks%fluid_force(:, 1), [0.0_wp, 0.0_wp, weight], &
-               1.0e-6_wp*weight)
-    call check('held box: no torque', norm2(block%blocks%fluid_torque(:, 1)), 0.0_wp, &
-               1.0e-6_wp*weight*0.04_wp)
-    call check('held box: still', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :))), 0.0_wp, &
-               1.0e-8_wp)
-    call check('held box: it does not move', maxval(abs(block%blocks%v)), 0.0_wp, 0.0_wp)
-  end subroutine held_box
-
-  !> A block as heavy as the liquid hovers.
-  subroutine block_of_water()
-    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 1000.0_wp)
-    call ready()
-    call begin_step(block%blocks)
-    call advance()
-    call check('block of water: hovers', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
-    call check('block of water: does not turn', maxval(abs(block%blocks%omega)), 0.0_wp, 1.0e-7_wp)
-  end subroutine block_of_water
-
   !> A block that a contact carries, with its weight under water, stays at rest; so does the water.
   subroutine block_at_rest()
-    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
-    block%case%fluid%liquid_viscosity = 10.0_wp
+    call build(12, 'kind="hexapod" size=.02', 2300.0_wp)
+    case%fluid%liquid_viscosity = 10.0_wp
     call ready()
-    call begin_step(block%blocks)
     block%blocks%contact_force(3, 1) = 1300.0_wp*coupling%bodies%volume(1)*g
     call advance()
     call check('block at rest: stays', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
@@ -245,28 +184,27 @@ contains
 
   !> Where nothing holds block and water, they fall together, whatever their densities: no force
   !! acts between them. Across the corner walls of its images stand in the last halo layers.
-  subroutine fall_together(kind, size, density, across_the_corner)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), density
+  subroutine fall_together(shape, density, across_the_corner)
+    character(*), intent(in) :: shape
+    real(wp), intent(in) :: density
     logical, intent(in), optional :: across_the_corner
     integer :: d
 
-    call build(12, kind, size, density)
-    if (present(across_the_corner)) block%case%body(1)%position = 0.119_wp
-    block%case%boundary%kind = 'periodic'
-    block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
-    block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
+    call build(12, shape, density)
+    if (present(across_the_corner)) case%body(1)%position = 0.119_wp
+    case%boundary%kind = 'periodic'
+    case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
+    case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
     call ready()
     block%flow%p = 0.0_wp
-    coupling%extrapolated(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
-    call begin_step(block%blocks)
+    coupling%extrapolated(1:3, 1) = dt*case%fluid%gravity   ! it has fallen before
     call advance()
-    associate (fall => dt*block%case%fluid%gravity)
-      call check(kind//' in free fall: velocity', block%blocks%v(:, 1), fall, 1.0e-8_wp*norm2(fall))
-      call check(kind//' in free fall: it does not turn', norm2(block%blocks%omega(:, 1)), 0.0_wp, &
+    associate (fall => dt*case%fluid%gravity)
+      call check(shape//' falls: velocity', block%blocks%v(:, 1), fall, 1.0e-8_wp*norm2(fall))
+      call check(shape//' falls: it does not turn', norm2(block%blocks%omega(:, 1)), 0.0_wp, &
                  1.0e-8_wp*norm2(fall)/0.05_wp)
       do d = 1, 3
-        call check(kind//' in free fall: the water too', &
+        call check(shape//' falls: the water too', &
                    maxval(abs(block%flow%u(1:12, 1:12, 1:12, d) - fall(d))), 0.0_wp, &
                    1.0e-8_wp*norm2(fall))
       end do
@@ -281,10 +219,9 @@ contains
     integer :: n
 
     do n = 1, 3
-      call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1100.0_wp)
-      block%case%body(1)%position = 0.08_wp + 0.01_wp*place(n)
+      call build(16, 'kind="sphere" size=.05', 1100.0_wp)
+      case%body(1)%position = 0.08_wp + 0.01_wp*place(n)
       call ready()
-      call begin_step(block%blocks)
       call advance()
       a(n) = -block%blocks%v(3, 1)/dt
     end do
@@ -301,14 +238,13 @@ contains
     real(wp), parameter :: rest = 1.0e-10_wp   !! that may be missing, of what is exchanged
     real(wp) :: before(3), after(3), motion(3), late
 
-    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
-    block%case%boundary%kind = 'periodic'
-    block%case%boundary%kind(:, 1) = 'slip'
-    block%case%fluid%gravity = 0.0_wp
-    block%case%body(1)%position = position
-    block%case%body(1)%velocity = [0.0_wp, 0.3_wp, -0.4_wp]
+    call build(12, 'kind="hexapod" size=.02', 2300.0_wp)
+    case%boundary%kind = 'periodic'
+    case%boundary%kind(:, 1) = 'slip'
+    case%fluid%gravity = 0.0_wp
+    case%body(1)%position = position
+    case%body(1)%velocity = [0.0_wp, 0.3_wp, -0.4_wp]
     call ready()
-    call begin_step(block%blocks)
     motion = block%blocks%v(:, 1)
     before = momentum()
     call advance()
@@ -339,15 +275,15 @@ contains
       !! of fluid and contact [N], torque of fluid and contact [N m]
     real(wp) :: gain(6)
 
-    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
-    block%case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
-    block%case%body(1)%angular_velocity = spin
+    call build(12, 'kind="box" size=.043,.031,.037', 1700.0_wp)
+    case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
+    case%body(1)%angular_velocity = spin
     call ready()
     block%blocks%fluid_force(:, 1) = forces(:, 1)
     block%blocks%contact_force(:, 1) = forces(:, 2)
     block%blocks%fluid_torque(:, 1) = forces(:, 3)
     block%blocks%contact_torque(:, 1) = forces(:, 4)
-    gain(1:3) = block%case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
+    gain(1:3) = case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
     call begin()
     call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
@@ -358,15 +294,14 @@ contains
   subroutine gas_in_a_cut_cell()
     integer :: c(3)
 
-    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
-    block%case%body(1)%fixed = .true.
+    call build(12, 'kind="box" size=.043,.031,.037', 1700.0_wp)
+    case%body(1)%fixed = .true.
     call ready()
     c = findloc(block%solid%alpha(1:12, 1:12, 1:12) > 0.3_wp &
                 .and. block%solid%alpha(1:12, 1:12, 1:12) < 0.7_wp, .true.)
     block%flow%liquid(c(1), c(2), c(3)) = 0.0_wp
-    call begin_step(block%blocks)
     call advance()
-    associate (fluid => block%case%fluid)
+    associate (fluid => case%fluid)
       call check('inertia: of the gas that is there', coupling%rho(c(1), c(2), c(3)), &
                  fluid%gas_density, 1.0e-12_wp*fluid%gas_density)
       coupling%rho(c(1), c(2), c(3)) = fluid%liquid_density
@@ -381,13 +316,13 @@ contains
     real(wp) :: p(3)
     integer :: d
 
-    associate (n => block%case%grid%cells)
+    associate (n => case%grid%cells)
       do d = 1, 3
         p(d) = sum(block%flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) &
                    *block%flow%u(1:n(1), 1:n(2), 1:n(3), d))
       end do
     end associate
-    p = block%case%fluid%liquid_density*p + block%blocks%mass(1)*block%blocks%v(:, 1)
+    p = case%fluid%liquid_density*p + block%blocks%mass(1)*block%blocks%v(:, 1)
   end function momentum
 
   !> However much the faces miss of a light body, its inertia stays positive.
@@ -395,8 +330,8 @@ contains
     real(wp) :: defect(6, 6), z(6)
     integer :: d
 
-    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 30.0_wp)
-    call place(block)
+    call build(12, 'kind="box" size=.043,.031,.037', 30.0_wp)
+    call place(case, block)
     defect = 0.0_wp
     do d = 1, 3
       defect(d, d) = (-1.0_wp)**d*10.0_wp*block%blocks%mass(1)

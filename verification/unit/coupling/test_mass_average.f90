@@ -2,13 +2,13 @@
 module test_mass_average_m
   use kinds_m, only: wp
   use mass_average_m, only: density_of_mixture
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_mass_average
 
-  character(8), parameter :: sides(2, 3) = 'slip'
   integer, parameter :: n(3) = [13, 11, 12]
   real(wp), parameter :: length(3) = [0.13_wp, 0.11_wp, 0.12_wp]   !! [m]
   type(one_body_t) :: block
@@ -18,9 +18,8 @@ module test_mass_average_m
 contains
 
   subroutine test_mass_average()
-    call describe(n, length, sides, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 0.47_wp*length, &
-                  block%case)
-    call place(block)
+    call place('&grid cells=13,11,12 length=.13,.11,.12/ &shape name="h" kind="hexapod" ' &
+               //'size=.02/ &body shape="h" position=.0611,.0517,.0564/ '//slip, block)
     allocate (mixture, source=block%flow%rho)
     fluid = block%case%fluid%liquid_density*(product(length) - block%bodies%volume(1))
     call density_of_mixture(block%grid, block%solid, block%bodies, block%flow%rho, mixture)

@@ -1,10 +1,12 @@
 !> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, links, pockets,
-!! periods, and the same bits for any part of the grid.
+!! periods.
 module test_solid_fraction_m
   use kinds_m, only: wp, pi
   use check_m, only: check
   use case_types_m, only: shape_input_t
   use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
+  use random_counter_m, only: uniform, random_rotation
+  use box_solid_m, only: simple_grid
   use boundary_kinds_m, only: side_no_slip, side_open, side_periodic
   use grid_m, only: grid_t, n_halo, unit_step
   use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, polyhedron_moments
@@ -20,7 +22,7 @@ module test_solid_fraction_m
 
   real(wp), parameter :: d = 0.02_wp   !! cube edge of the hexapod [m]
   real(wp), parameter :: identity(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-  integer :: seed_value = 4711
+  integer :: n_drawn = 0
 
 contains
 
@@ -37,55 +39,49 @@ contains
     call degenerate_poses()
     call three_links_on_the_floor()
     call links_of_a_box()
-    call links_of_a_sphere()
     call partly_outside()
     call bodies_in_contact()
     call sealed_pocket()
     call periods()
-    call any_part_of_the_grid()
-    call clean_after_moving()
     call filled_if_moved()
   end subroutine test_solid_fraction
 
   !> Repeatable number in 0..1.
-  function draw() result(r)
-    real(wp) :: r
-
-    seed_value = 16807*mod(seed_value, 127773) - 2836*(seed_value/127773)
-    if (seed_value <= 0) seed_value = seed_value + 2147483647
-    r = real(seed_value, wp)/2147483647.0_wp
+  real(wp) function draw()
+    n_drawn = n_drawn + 1
+    draw = uniform(4712, 1, n_drawn)
   end function draw
 
   function draw_attitude() result(q)
     real(wp) :: q(4)
-    integer :: i
 
-    do i = 1, 4
-      q(i) = draw() - 0.5_wp
-    end do
-    q = normalised(q)
+    n_drawn = n_drawn + 1
+    q = random_rotation(4712, n_drawn)
   end function draw_attitude
 
-  function make_grid(n, length, origin) result(grid)
+  !> A grid with walls all round.
+  function make_grid(n, length) result(grid)
     integer, intent(in) :: n(3)
     real(wp), intent(in) :: length(3)
-    real(wp), intent(in), optional :: origin(3)
     type(grid_t) :: grid
 
-    grid%n = n
-    call grid%own([1, 1, 1], n)
-    grid%length = length
-    grid%h = length/real(n, wp)
-    if (present(origin)) grid%origin = origin
-    grid%volume = product(grid%h)
-    grid%area = grid%volume/grid%h
+    call simple_grid(n, length, grid)
     grid%side = side_no_slip
   end function make_grid
+
+  !> A body alone.
+  subroutine make_body(kind, size, x, q, blocks)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(:), x(3), q(4)
+    type(blocks_t), intent(out) :: blocks
+
+    call make_bodies(kind, size, reshape(x, [3, 1]), reshape(q, [4, 1]), blocks)
+  end subroutine make_body
 
   !> Bodies of one shape, all present.
   subroutine make_bodies(kind, size, x, q, blocks)
     character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), x(:, :), q(:, :)
+    real(wp), intent(in) :: size(:), x(:, :), q(:, :)
     type(blocks_t), intent(out) :: blocks
     type(shape_input_t) :: input
     character(:), allocatable :: message
@@ -93,7 +89,7 @@ contains
 
     n = ubound(x, 2)
     input%kind = kind
-    input%size = size
+    input%size(:ubound(size, 1)) = size
     blocks%n = n
     allocate (blocks%shapes(1), blocks%shape(n), blocks%present(n))
     blocks%shape = 1
@@ -129,13 +125,12 @@ contains
 
     grid = make_grid(n, length)
     size_m = [merge(d, 2*d, kind == 'hexapod'), 2*d, 0.0_wp]
-    call make_bodies(kind, size_m, reshape(0.5_wp*length, [3, 1]), &
-                         reshape(identity, [4, 1]), blocks)
+    call make_body(kind, size_m, 0.5_wp*length, identity, blocks)
     call solid_geometry_init(grid, solid, 1)
     call solid_fraction_init(grid, blocks, fraction)
     worst = 0.0_wp
     do p = 1, poses
-      blocks%x(:, 1) = 0.5_wp*length + (0.5_wp*length - 0.035_wp)*(2*[draw(), draw(), draw()] - 1)
+      blocks%x(:, 1) = 0.5_wp*length + (0.5_wp*length - 0.04_wp)*(2*[draw(), draw(), draw()] - 1)
       if (mod(p, 4) == 0) blocks%x(:, 1) = grid%h*anint(blocks%x(:, 1)/grid%h)
       blocks%q(:, 1) = draw_attitude()
       if (mod(p, 8) == 0) blocks%q(:, 1) = quarter_turns(p/8)
@@ -189,18 +184,17 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
+    character(7), parameter :: kind(4) = [character(7) :: 'hexapod', 'hexapod', 'hexapod', 'sphere']
+    real(wp), parameter :: size_m(4) = [d, d, d, 0.05_wp]
     real(wp) :: worst(4)
     integer :: p
 
     grid = make_grid([14, 16, 18], [0.07_wp, 0.08_wp, 0.081_wp])
     worst = 0.0_wp
     do p = 1, 4
-      call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
-                           reshape([0.035_wp, 0.04_wp, 0.04_wp], [3, 1]), &
-                           reshape(identity, [4, 1]), blocks)
+      call make_body(kind(p), size_m(p:p), [0.035_wp, 0.04_wp, 0.04_wp], identity, blocks)
       if (p > 1) blocks%q(:, 1) = draw_attitude()
       if (p > 2) blocks%x(:, 1) = blocks%x(:, 1) + 0.005_wp*[draw(), draw(), draw()]
-      if (p == 4) call make_bodies('sphere', [0.05_wp, 0.0_wp, 0.0_wp], blocks%x, blocks%q, blocks)
       call fill(grid, blocks, solid)
       call compare_with_tets(grid, blocks, solid, worst)
     end do
@@ -316,9 +310,7 @@ contains
     counted = .true.
     beta = .true.
     do p = 0, 15
-      call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
-                           reshape([0.05_wp, 0.05_wp, 0.16_wp], [3, 1]), &
-                           reshape(quarter_turns(p), [4, 1]), blocks)
+      call make_body('hexapod', [d], [0.05_wp, 0.05_wp, 0.16_wp], quarter_turns(p), blocks)
       call fill(grid, blocks, solid)
       whole = whole .and. solid%n_cut == 0 .and. abs(sum(solid%alpha) - 7*64) <= 0.0_wp
       counted = counted .and. solid%body_cell(2) - 1 == 448 .and. count(solid%inside == 1) == 448
@@ -363,8 +355,7 @@ contains
     do e = 1, 2
       do m = 1, 3
         x = [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp]
-        call make_bodies('cube', [edges(e), 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
-                         reshape(identity, [4, 1]), blocks)
+        call make_body('cube', [edges(e)], x, identity, blocks)
         call fill(grid, blocks, solid)
         do i = 1, 20
           inside = inside .and. all(solid%inside(i, 1:20, 1:20) &
@@ -408,14 +399,11 @@ contains
       end do
       select case (mod(p, 3))
       case (0)
-        call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
-                         reshape(q, [4, 1]), blocks)
+        call make_body('hexapod', [d], x, q, blocks)
       case (1)
-        call make_bodies('box', [0.02_wp, 0.03_wp, 0.0075_wp], reshape(x, [3, 1]), &
-                         reshape(q, [4, 1]), blocks)
+        call make_body('box', [0.02_wp, 0.03_wp, 0.0075_wp], x, q, blocks)
       case default
-        call make_bodies('sphere', [0.04_wp, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
-                         reshape(q, [4, 1]), blocks)
+        call make_body('sphere', [0.04_wp], x, q, blocks)
       end select
       call fill(grid, blocks, solid)
       worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
@@ -493,9 +481,7 @@ contains
 
     grid = make_grid([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp])
     q = normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp])
-    call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
-                     reshape([0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], [3, 1]), &
-                     reshape(q, [4, 1]), blocks)
+    call make_body('hexapod', [d], [0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], q, blocks)
     call fill(grid, blocks, solid)
     call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
                1e-7_wp*d**3)
@@ -520,9 +506,8 @@ contains
     same = .true.
     flags = .true.
     do p = 1, 20
-      call make_bodies('box', size_m, reshape([0.04_wp, 0.028_wp, 0.036_wp] + &
-                                                  0.004_wp*[draw(), draw(), draw()], [3, 1]), &
-                           reshape(draw_attitude(), [4, 1]), blocks)
+      call make_body('box', size_m, [0.04_wp, 0.028_wp, 0.036_wp] + 0.004_wp*[draw(), draw(), &
+                     draw()], draw_attitude(), blocks)
       if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
       e = maxval(blocks%shapes(1)%point, 2)
       call fill(grid, blocks, solid)
@@ -581,46 +566,6 @@ contains
     end if
   end subroutine cross_box
 
-  !> A sphere: hits within the distance between its polyhedron and the sphere; no link without a hit
-  !! between inside and outside.
-  subroutine links_of_a_sphere()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    type(links_t) :: links
-    real(wp) :: x(3), worst
-    integer :: i, j, k, m, n(3)
-    logical :: complete
-
-    grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
-    call make_bodies('sphere', [0.05_wp, 0.0_wp, 0.0_wp], &
-                     reshape([0.041_wp, 0.0405_wp, 0.039_wp], [3, 1]), &
-                     reshape(identity, [4, 1]), blocks)
-    call fill(grid, blocks, solid)
-    links = links_on_grid(solid)
-    worst = 0.0_wp
-    complete = .true.
-    do m = 1, 3
-      do k = 2, 16
-        do j = 2, 16
-          do i = 2, 16
-            n = [i, j, k] - unit_step(:, m)
-            if (links%low(i, j, k, m) > 1) then
-              complete = complete .and. (solid%inside(i, j, k) == solid%inside(n(1), n(2), n(3)))
-            else
-              x = grid%centre(n, [1, 2, 3]) - blocks%x(:, 1)
-              x(m) = x(m) + links%low(i, j, k, m)*grid%h(m)
-              worst = max(worst, abs(norm2(x) - 0.025_wp))
-            end if
-          end do
-        end do
-      end do
-    end do
-    call check('sphere: hits lie on the sphere', worst/0.025_wp, 0.0_wp, 0.012_wp)
-    call check('sphere: links between inside and outside are cut', complete)
-    call check('sphere: most links are free', solid%n_link < 1000)
-  end subroutine links_of_a_sphere
-
   !> A box through the open top: what is outside the domain is not in the grid.
   subroutine partly_outside()
     type(grid_t) :: grid
@@ -628,9 +573,8 @@ contains
     type(solid_geometry_t) :: solid
 
     grid = make_grid([10, 10, 10], [0.05_wp, 0.05_wp, 0.05_wp])
-    call make_bodies('box', [0.01_wp, 0.01_wp, 0.02_wp], &
-                     reshape([0.0275_wp, 0.0275_wp, 0.05_wp], [3, 1]), &
-                     reshape(identity, [4, 1]), blocks)
+    call make_body('box', [0.01_wp, 0.01_wp, 0.02_wp], [0.0275_wp, 0.0275_wp, 0.05_wp], identity, &
+                   blocks)
     call fill(grid, blocks, solid)
     call check('half outside: half the volume', sum(solid%alpha)*grid%volume, 1e-6_wp, 1e-18_wp)
     call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp, 0.0_wp)
@@ -726,9 +670,7 @@ contains
     grid%periodic = [.true., .false., .true.]
     grid%side(:, 1) = side_periodic
     grid%side(:, 3) = side_periodic
-    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], &
-                         reshape([0.0078125_wp, 0.05_wp, 0.09_wp], [3, 1]), &
-                         reshape(draw_attitude(), [4, 1]), blocks)
+    call make_body('hexapod', [0.015_wp], [0.0078125_wp, 0.05_wp, 0.09_wp], draw_attitude(), blocks)
     far = blocks
     far%x(1, 1) = far%x(1, 1) - 3*grid%length(1)
     call fill(grid, blocks, solid)
@@ -787,117 +729,34 @@ contains
            all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
   end function same_bits
 
-  !> A process that owns a part of the grid gets the bits of the one that owns all.
-  subroutine any_part_of_the_grid()
-    type(grid_t) :: grid, part
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: whole, piece
-    type(links_t) :: of_whole, of_piece
-    real(wp) :: x(3, 3), q(4, 3)
-    integer :: lo(3), a(3), b(3), e(3), i, c, d
-    logical :: same, tets
-
-    grid = make_grid([32, 16, 24], [0.16_wp, 0.08_wp, 0.12_wp])
-    do i = 1, 3
-      x(:, i) = [0.04_wp*i, 0.04_wp, 0.06_wp] + 0.01_wp*[draw(), draw(), draw()]
-      q(:, i) = draw_attitude()
-    end do
-    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
-    call fill(grid, blocks, whole)
-    of_whole = links_on_grid(whole)
-    same = .true.
-    tets = .true.
-    do i = 0, 3
-      part = grid
-      lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
-      call part%own(lo, lo + [15, 15, 11])
-      call fill(part, blocks, piece)
-      of_piece = links_on_grid(piece)
-      a = part%first
-      b = part%last
-      associate (low => max(a, 1), high => min(b, grid%n))
-        same = same .and. all(abs(piece%alpha(low(1):high(1), low(2):high(2), low(3):high(3)) - &
-                                  whole%alpha(low(1):high(1), low(2):high(2), low(3):high(3))) <= 0)
-        do d = 1, 3   ! faces with both cells in the part: a cell that bodies fill closes its faces
-          e = merge(low + unit_step(:, d), low, a > 1)
-          same = same .and. all(abs( &
-            piece%aperture(e(1):high(1), e(2):high(2), e(3):high(3), d) - &
-            whole%aperture(e(1):high(1), e(2):high(2), e(3):high(3), d)) <= 0)
-        end do
-        same = same .and. all(abs( &
-          of_piece%high(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
-          of_whole%high(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
-        same = same .and. all(piece%inside(low(1):high(1), low(2):high(2), low(3):high(3)) == &
-                              whole%inside(low(1):high(1), low(2):high(2), low(3):high(3)))
-      end associate
-      do c = 1, piece%n_cut
-        associate (n => piece%cut_cell(:, c))
-          tets = tets .and. abs(volume_of_tets(part, piece, c) - &
-                                volume_of_tets(grid, whole, whole%cut(n(1), n(2), n(3)))) <= 0
-        end associate
-      end do
-    end do
-    call check('parts of the grid: the same bits', same)
-    call check('parts of the grid: the same tetrahedra in cut cells', tets)
-  end subroutine any_part_of_the_grid
-
-  !> After many moves nothing of the old places is left; two objects may take turns.
-  subroutine clean_after_moving()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid(2), fresh
-    type(solid_fraction_t) :: fraction
-    real(wp) :: x(3, 3), q(4, 3)
-    integer :: s, i
-    logical :: same
-
-    grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
-    q = spread(identity, 2, 3)
-    x = spread([0.05_wp, 0.04_wp, 0.05_wp], 2, 3)
-    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
-    call solid_fraction_init(grid, blocks, fraction)
-    call solid_geometry_init(grid, solid(1), 3)
-    call solid_geometry_init(grid, solid(2), 3)
-    same = .true.
-    do s = 1, 12
-      do i = 2, 3   ! the first stays where it is
-        blocks%x(:, i) = 0.05_wp + 0.05_wp*(2*[draw(), draw(), draw()] - 1)
-        blocks%q(:, i) = draw_attitude()
-      end do
-      blocks%present(3) = mod(s, 3) > 0
-      call update_solid(fraction, grid, blocks, solid(1 + mod(s, 2)))
-      call fill(grid, blocks, fresh)
-      same = same .and. same_bits(solid(1 + mod(s, 2)), fresh)
-    end do
-    call check('moving: as if filled afresh', same)
-  end subroutine clean_after_moving
-
-  !> Two geometries in turn; a body only turns, only moves, only comes or goes, or nothing does.
+  !> Two geometries in turn; one of three bodies only turns, only moves, only comes or goes, or
+  !! nothing does: nothing of the old places is left.
   subroutine filled_if_moved()
     real(wp), parameter :: mark = 0.25_wp
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid(2), fresh
     type(solid_fraction_t) :: fraction
-    integer :: s, turn
+    integer :: s, turn, b
     logical :: same
 
     grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
-    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], &
-                     spread([0.05_wp, 0.04_wp, 0.05_wp], 2, 1), spread(identity, 2, 1), blocks)
+    call make_bodies('hexapod', [0.015_wp], reshape([0.03_wp, 0.04_wp, 0.03_wp, 0.05_wp, 0.04_wp, &
+      0.05_wp, 0.02_wp, 0.07_wp, 0.09_wp], [3, 3]), spread(identity, 2, 3), blocks)
     call solid_fraction_init(grid, blocks, fraction)
-    call solid_geometry_init(grid, solid(1), 1)
-    call solid_geometry_init(grid, solid(2), 1)
+    call solid_geometry_init(grid, solid(1), 3)
+    call solid_geometry_init(grid, solid(2), 3)
     same = .true.
     turn = 1
-    do s = 1, 16
+    do s = 1, 24
+      b = 1 + mod(s/8, 3)
       select case (mod(s/2, 4))   ! the second of two is as the first
       case (1)
-        if (mod(s, 2) == 0) blocks%q(:, 1) = draw_attitude()
+        if (mod(s, 2) == 0) blocks%q(:, b) = draw_attitude()
       case (2)
-        if (mod(s, 2) == 0) blocks%x(:, 1) = blocks%x(:, 1) + [0.003_wp, 0.0_wp, -0.002_wp]
+        if (mod(s, 2) == 0) blocks%x(:, b) = blocks%x(:, b) + [0.003_wp, 0.0_wp, -0.002_wp]
       case default
-        if (mod(s, 2) == 0) blocks%present(1) = .not. blocks%present(1)
+        if (mod(s, 2) == 0) blocks%present(b) = .not. blocks%present(b)
       end select
       turn = 3 - turn
       call update_solid(fraction, grid, blocks, solid(turn))

@@ -5,13 +5,14 @@ module test_subcell_m
   use grid_m, only: unit_step
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip, body
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_subcell
 
-  character(8), parameter :: sides(2, 3) = 'slip'
+  character(*), parameter :: tank = '&grid cells=14,15,13 length=.07,.09,.065/ '//slip
   real(wp), parameter :: edge = 0.02_wp
   type(one_body_t) :: block
   type(solid_fraction_t) :: fraction
@@ -21,10 +22,8 @@ module test_subcell_m
 contains
 
   subroutine test_subcell()
-    call describe([14, 15, 13], [0.07_wp, 0.09_wp, 0.065_wp], sides, 'hexapod', &
-                  [edge, 0.0_wp, 0.0_wp], [0.0341_wp, 0.0437_wp, 0.0329_wp], block%case)
-    block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 0.7_wp)
-    call place(block)
+    call place(tank//'&shape name="h" kind="hexapod" size=.02/ '//body('h', [0.0341_wp, &
+      0.0437_wp, 0.0329_wp], q=quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 0.7_wp)), block)
     call count_points(4)
     error(1) = worst_share()
     call count_points(7)
@@ -35,15 +34,12 @@ contains
     call check('16 sub-cells: smaller error', error(2) < 0.3_wp*error(1))
 
     ! A box whose sides lie on the grid: exact, and closed all round.
-    call describe([14, 15, 13], [0.07_wp, 0.09_wp, 0.065_wp], sides, 'box', &
-                  [0.02_wp, 0.018_wp, 0.015_wp], [0.03_wp, 0.039_wp, 0.0325_wp], block%case)
-    call place(block)
+    call place(tank//'&shape name="b" kind="box" size=.02,.018,.015/ &body shape="b" ' &
+               //'position=.03,.039,.0325/', block)
     call recount(3)
-    call check('box on the grid: shares', maxval(abs(solid%alpha - block%solid%alpha)), 0.0_wp, &
-               1.0e-15_wp)
-    call check('box on the grid: faces', &
-               maxval(abs(solid%aperture - block%solid%aperture)), 0.0_wp, &
-               1.0e-15_wp)
+    call check('box on the grid: shares', worst_share(), 0.0_wp, 1.0e-15_wp)
+    call check('box on the grid: faces', maxval(abs(solid%aperture - block%solid%aperture)), &
+               0.0_wp, 1.0e-15_wp)
     call check('box on the grid: there it is', count(solid%alpha > 0.5_wp), 4*3*3)
   end subroutine test_subcell
 

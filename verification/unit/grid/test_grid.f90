@@ -1,10 +1,10 @@
 !> Kinds of sides, and which cells and faces lie at them, outside the domain or with this process.
 module test_grid_m
   use kinds_m, only: wp
-  use case_types_m, only: grid_input_t, boundary_input_t
   use boundary_kinds_m, only: no_side, side_no_slip, side_slip, side_open, side_periodic, &
     side_inflow, side_outflow, side_code, side_names, is_wall, gives_pressure, gives_velocity, drags
-  use grid_m, only: grid_t, grid_init
+  use grid_m, only: grid_t
+  use case_text_m, only: grid_of
   use check_m, only: check
   implicit none
   private
@@ -17,9 +17,12 @@ module test_grid_m
 
 contains
 
+  !> Of a tank with inflow and outflow in x, periodic in y, walls below and above.
   subroutine test_grid()
     call table_of_kinds()
-    call start_grid(grid)
+    call grid_of('&grid cells=6,4,5 length=3*1/ &fluid water_level=.5/ &boundary x_min="inflow" ' &
+      //'x_min_velocity=1,0,0 x_max="outflow" y_min="periodic" y_max="periodic" ' &
+      //'z_min="no_slip" z_max="slip"/', grid)
     call places_of_cells(grid)
     call sides_of_domain(grid)
     call sides_of_part(grid)
@@ -41,20 +44,6 @@ contains
     call check('no side asks for anything', .not. any([is_wall(no_side), gives_pressure(no_side), &
                                                        gives_velocity(no_side), drags(no_side)]))
   end subroutine table_of_kinds
-
-  !> A tank with inflow and outflow in x, periodic in y, walls below and above.
-  subroutine start_grid(grid)
-    type(grid_t), intent(out) :: grid
-    type(grid_input_t) :: input
-    type(boundary_input_t) :: boundary
-
-    input%cells = cells
-    input%length = 1.0_wp
-    boundary%kind(:, 1) = [character(8) :: 'inflow', 'outflow']
-    boundary%kind(:, 2) = 'periodic'
-    boundary%kind(:, 3) = [character(8) :: 'no_slip', 'slip']
-    call grid_init(input, boundary, grid)
-  end subroutine start_grid
 
   subroutine places_of_cells(grid)
     type(grid_t), intent(in) :: grid

@@ -5,17 +5,16 @@ module test_rigid_flux_m
   use grid_m, only: n_halo, unit_step
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, &
     force_from_faces, force_from_cells, add_cell_flux, nearest_arm, middle_of_face
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use case_text_m, only: sides, body
+  use one_body_m, only: one_body_t, place, random_numbers
   use check_m, only: check
   implicit none
   private
   public :: test_rigid_flux
 
-  character(8), parameter :: closed(2, 3) = 'slip', &
-    periodic(2, 3) = reshape([character(8) :: 'periodic', 'periodic', 'periodic', 'periodic', &
-                              'slip', 'open'], [2, 3])
+  character(*), parameter :: closed = 'slip slip slip slip slip slip', &
+    periodic = 'periodic periodic periodic periodic slip open'
   integer, parameter :: cells(3) = [12, 10, 8]
-  real(wp), parameter :: tank(3) = [0.24_wp, 0.15_wp, 0.16_wp]     !! [m]
   real(wp), parameter :: edges(3) = [0.083_wp, 0.061_wp, 0.077_wp] !! of the box [m]
   real(wp), parameter :: middle(3) = [0.1223_wp, 0.0719_wp, 0.0831_wp]
   type(one_body_t) :: box
@@ -34,17 +33,14 @@ contains
   end subroutine test_rigid_flux
 
   !> A block in a tank; fluid can move in all cells that are not full.
-  subroutine build(sides, position, turned)
-    character(*), intent(in) :: sides(2, 3)
+  subroutine build(around, position, turned)
+    character(*), intent(in) :: around   !! kinds of the sides
     real(wp), intent(in) :: position(3)
     logical, intent(in) :: turned
-    type(one_body_t) :: fresh
 
-    box = fresh
-    call describe(cells, tank, sides, 'box', edges, position, box%case)
-    if (turned) box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 2.0_wp, -1.0_wp], &
-                                                                  0.6_wp)
-    call place(box)
+    call place('&grid cells=12,10,8 length=.24,.15,.16/ &shape name="b" kind="box" ' &
+      //'size=.083,.061,.077/ '//sides(around)//body('b', position, q=quaternion_from_axis( &
+      [1.0_wp, 2.0_wp, -1.0_wp], merge(0.6_wp, 0.0_wp, turned))), box)
     if (allocated(active)) deallocate (active)
     allocate (active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                      1 - n_halo:cells(3) + n_halo))

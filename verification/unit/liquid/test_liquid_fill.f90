@@ -1,17 +1,12 @@
 !> Initial liquid and the rise of the surface when a block appears: exact volumes, level surfaces.
 module test_liquid_fill_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t, fluid_t, water_t
-  use vectors_m, only: quaternion_from_axis
+  use case_types_m, only: fluid_t, water_t
   use polyhedron_m, only: tet_moments_below
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t
-  use case_blocks_m, only: blocks_init
-  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use one_body_m, only: one_body_t, place
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use liquid_fill_m, only: fill_liquid, raise_surface, liquid_volume
   use box_solid_m, only: set_boxes, simple_grid
@@ -54,6 +49,19 @@ contains
 
     call set_boxes(grid, nothing, nothing, solid)
   end subroutine empty
+
+  !> Still water up to a level, before anything appears; everywhere without one.
+  subroutine still(level)
+    real(wp), intent(in), optional :: level   !! [m]
+
+    call empty(before)
+    if (present(level)) then
+      call fill_liquid(grid, fluid_t(water_level=level), [water_t ::], before, flow)
+    else
+      call fill_liquid(grid, fluid_t(single_phase=.true.), [water_t ::], before, flow)
+    end if
+    call extend_fraction(grid, before, extension, flow)
+  end subroutine still
 
   !> Largest difference of C^ within a row.
   real(wp) function spread_of_rows()
@@ -119,14 +127,10 @@ contains
   subroutine box_appears(level, box_low, box_high, name)
     real(wp), intent(in) :: level, box_low(3), box_high(3)
     character(*), intent(in) :: name
-    type(fluid_t) :: fluid
     real(wp) :: low(3, 1), high(3, 1), rest, new_level, volume, foot
     integer :: k
 
-    fluid%water_level = level
-    call empty(before)
-    call fill_liquid(grid, fluid, [water_t ::], before, flow)
-    call extend_fraction(grid, before, extension, flow)
+    call still(level)
     low(:, 1) = box_low
     high(:, 1) = box_high
     call set_boxes(grid, low, high, after)
@@ -151,62 +155,38 @@ contains
   !> A tilted hexapod through the surface: liquid around it by its tetrahedra, then as one that
   !! appears.
   subroutine block_appears()
-    type(case_t) :: case
-    type(shape_t) :: shapes(1)
-    type(blocks_t) :: blocks
-    type(solid_fraction_t) :: fraction
-    type(fluid_t) :: fluid
-    character(:), allocatable :: message
-    real(wp) :: rest, volume, displaced, part, moment(3)
+    type(one_body_t) :: block
+    real(wp), parameter :: level = 0.1413_wp
+    real(wp) :: rest, displaced, part, moment(3)
     integer :: t
 
-    allocate (case%shape(1), case%body(1), case%drop(0))
-    case%shape(1)%name = 'hexapod'
-    case%shape(1)%kind = 'hexapod'
-    case%shape(1)%size = 0.016_wp
-    case%shape(1)%refinement = 1
-    case%body(1)%shape = 'hexapod'
-    case%body(1)%position = [0.0771_wp, 0.0311_wp, 0.1371_wp]
-    case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 0.3_wp, 0.7_wp], 0.6_wp)
-    call make_shape(case%shape(1), shapes(1), message)
-    call blocks_init(case, shapes, blocks)
-    call solid_geometry_init(grid, before, blocks%n)
-    call solid_geometry_init(grid, after, blocks%n)
-    call solid_fraction_init(grid, blocks, fraction)
-    fluid%water_level = 0.1413_wp
-
-    call update_solid(fraction, grid, blocks, after)
-    call fill_liquid(grid, fluid, [water_t ::], after, flow)
+    call place('&grid cells=16,12,20 length=.16,.06,.2/ &shape name="h" kind="hexapod" ' &
+      //'size=.016 refinement=1/ &body shape="h" position=.0771,.0311,.1371 axis=1,.3,.7 ' &
+      //'angle_deg=34/', block)
+    call fill_liquid(grid, fluid_t(water_level=level), [water_t ::], block%solid, flow)
     displaced = 0.0_wp
-    do t = 1, after%tets%n
-      call tet_moments_below(after%tets%corner(:, :, t), up, 0.1413_wp, part, moment)
+    do t = 1, block%solid%tets%n
+      call tet_moments_below(block%solid%tets%corner(:, :, t), up, level, part, moment)
       displaced = displaced + part
     end do
     call check('hexapod: liquid around it', flow%liquid_initial, &
-               tank(1)*tank(2)*0.1413_wp - displaced, 1.0e-13_wp*flow%liquid_initial)
-    call extend_fraction(grid, after, extension, flow)
+               tank(1)*tank(2)*level - displaced, 1.0e-13_wp*flow%liquid_initial)
+    call extend_fraction(grid, block%solid, extension, flow)
     call check('hexapod: each row has one C^', spread_of_rows(), 0.0_wp, 1.0e-12_wp)
 
-    blocks%present = .false.
-    call update_solid(fraction, grid, blocks, before)
-    call fill_liquid(grid, fluid, [water_t ::], before, flow)
-    call extend_fraction(grid, before, extension, flow)
-    call raise_surface(grid, before, after, extension, flow, rest)
-    volume = liquid_volume(grid, flow%liquid)
-    call check('hexapod appears: volume', volume/flow%liquid_initial, 1.0_wp, 1.0e-14_wp)
+    call still(level)
+    call raise_surface(grid, before, block%solid, extension, flow, rest)
+    call check('hexapod appears: volume', liquid_volume(grid, flow%liquid)/flow%liquid_initial, &
+               1.0_wp, 1.0e-14_wp)
     call check('hexapod appears: all of it found a place', rest, 0.0_wp, 0.0_wp)
     call check('hexapod appears: each row has one C^', spread_of_rows(), 0.0_wp, 1.0e-12_wp)
   end subroutine block_appears
 
   !> Liquid everywhere: what the box displaces leaves the tank and is booked.
   subroutine no_surface()
-    type(fluid_t) :: fluid
     real(wp) :: low(3, 1), high(3, 1), rest
 
-    fluid%single_phase = .true.
-    call empty(before)
-    call fill_liquid(grid, fluid, [water_t ::], before, flow)
-    call extend_fraction(grid, before, extension, flow)
+    call still()
     low(:, 1) = [0.0333_wp, 0.0222_wp, 0.0444_wp]
     high(:, 1) = [0.0777_wp, 0.0333_wp, 0.0888_wp]
     call set_boxes(grid, low, high, after)

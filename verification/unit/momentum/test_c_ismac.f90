@@ -12,7 +12,7 @@ module test_c_ismac_m
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor, &
                                 advected_velocity
-  use one_body_m, only: one_body_t, describe, place
+  use one_body_m, only: one_body_t, place
   use box_solid_m, only: simple_grid
   use check_m, only: check
   implicit none
@@ -268,8 +268,6 @@ contains
   !> Without advection the predictor is the viscous stage, with a free body, wall links and small
   !! cells.
   subroutine without_advection()
-    character(8), parameter :: sides(2, 3) = reshape([character(8) :: &
-      'no_slip', 'slip', 'periodic', 'periodic', 'no_slip', 'open'], [2, 3])
     real(wp), parameter :: dt = 0.05_wp
     type(one_body_t) :: block
     type(rigid_motion_t) :: bodies
@@ -277,13 +275,11 @@ contains
     real(wp), allocatable :: u(:, :, :, :), u_expected(:, :, :, :)
     integer :: c, i, j, k
 
-    call describe([12, 12, 12], [0.12_wp, 0.12_wp, 0.12_wp], sides, 'hexapod', &
-                  [0.02_wp, 0.0_wp, 0.0_wp], [0.061_wp, 0.058_wp, 0.063_wp], block%case)
-    block%case%fluid%liquid_viscosity = 0.5_wp
-    block%case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
-    block%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
-    block%case%boundary%velocity(:, 1, 3) = [0.4_wp, 0.0_wp, 0.0_wp]
-    call place(block)
+    call place('&grid cells=3*12 length=3*.12/ &fluid liquid_viscosity=.5/ &boundary ' &
+      //'x_min="no_slip" x_max="slip" y_min="periodic" y_max="periodic" z_min="no_slip" ' &
+      //'z_max="open" z_min_velocity=.4,0,0/ &shape name="h" kind="hexapod" size=.02/ ' &
+      //'&body shape="h" position=.061,.058,.063 velocity=.3,-.2,.1 angular_velocity=2,1,-3/', &
+      block)
     do c = 1, 3
       do k = 1, 12
         do j = 1, 12

@@ -7,18 +7,15 @@ module test_half_kick_m
   use advected_pressure_m, only: advect_pressure
   use mixture_m, only: mix_fluid, mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use merged_cells_m, only: merged_cells_t
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place, random_field
   use check_m, only: check
   implicit none
   private
   public :: test_half_kick
 
-  character(8), parameter :: sides(2, 3) = 'slip'
   integer, parameter :: cells(3) = [9, 8, 7]
-  real(wp), parameter :: tank(3) = 0.1_wp*cells                      !! [m]
-  real(wp), parameter :: edges(3) = [0.26_wp, 0.28_wp, 0.26_wp]      !! of the box [m]
-  real(wp), parameter :: middle(3) = [0.30_wp, 0.35_wp, 0.30_wp]     !! [m]
   real(wp), parameter :: rise(3) = [300.0_wp, -500.0_wp, 700.0_wp]   !! of the pressure [Pa/m]
   integer, parameter :: mixed(3) = [7, 6, 5]                         !! a cell with gas
   real(wp), parameter :: dt = 0.02_wp                                !! [s]
@@ -33,8 +30,8 @@ module test_half_kick_m
 contains
 
   subroutine test_half_kick()
-    call describe(cells, tank, sides, 'box', edges, middle, box%case)
-    call place(box)
+    call place('&grid cells=9,8,7 length=.9,.8,.7/ &shape name="b" kind="box" size=.26,.28,.26/ ' &
+               //'&body shape="b" position=.3,.35,.3/ '//slip, box, merged)
     seed = 5
     associate (flow => box%flow, grid => box%grid, fluid => box%case%fluid)
       flow%c(mixed(1), mixed(2), mixed(3)) = 0.5_wp
@@ -43,17 +40,14 @@ contains
         do j = 1 - n_halo, cells(2) + n_halo
           do i = 1 - n_halo, cells(1) + n_halo
             flow%p(i, j, k) = dot_product(rise, 0.1_wp*[i, j, k])
-            call random_numbers(seed, flow%u(i, j, k, :))
           end do
         end do
       end do
-      flow%fluid_volume = grid%volume*(1.0_wp - box%solid%alpha)
+      call random_field(seed, flow%u)
       flow%liquid = flow%fluid_volume*flow%c
       before = flow%u
       half = 0.5_wp*dt*(fluid%gravity - rise/fluid%liquid_density)
       call acceleration_init(grid, a)
-      call merged_cells_init(grid, merged)
-      call find_merged_cells(grid, box%solid, merged)
       extrapolated(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
       call find_liquid(grid, flow, a%kicked)
       call advect_pressure(grid, fluid%liquid_density*fluid%gravity, box%solid%alpha, box%bodies, &

@@ -12,7 +12,8 @@ module test_surface_tension_m
                                force_from_tension
   use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use box_solid_m, only: simple_grid, set_boxes
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: sides
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
@@ -350,15 +351,13 @@ contains
     type(rigid_flux_t) :: flux
     real(wp), allocatable :: p(:, :, :)
     logical, allocatable :: active(:, :, :)
-    character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
-      'slip', 'slip', 'periodic', 'periodic', 'slip', 'slip'], [2, 3])
     real(wp), parameter :: pressure = 3.0_wp   !! sigma kappa [Pa]
     real(wp) :: force(6, 1), pull(6, 1), size_of_force
     integer :: i, j, k, d, e(3)
 
-    call describe([16, 12, 18], [0.16_wp, 0.12_wp, 0.18_wp], tank, 'hexapod', &
-                  [0.02_wp, 0.0_wp, 0.0_wp], [0.0771_wp, 0.0611_wp, 0.0829_wp], block%case)
-    call place(block)
+    call place('&grid cells=16,12,18 length=.16,.12,.18/ &shape name="h" kind="hexapod" ' &
+      //'size=.02/ &body shape="h" position=.0771,.0611,.0829/ ' &
+      //sides('slip slip periodic periodic slip slip'), block)
     associate (g => block%grid)
       allocate (p, source=block%solid%alpha)
       allocate (active(g%first(1):g%last(1), g%first(2):g%last(2), &

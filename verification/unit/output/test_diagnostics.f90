@@ -3,6 +3,7 @@
 module test_diagnostics_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
+  use case_text_m, only: case_of
   use grid_m, only: grid_init
   use fields_m, only: flow_init
   use solid_geometry_m, only: solid_geometry_init
@@ -24,8 +25,7 @@ module test_diagnostics_m
 contains
 
   subroutine test_diagnostics()
-    case%grid%cells = [4, 4, 4]
-    case%grid%length = [0.4_wp, 0.8_wp, 1.0_wp]
+    case = case_of('&grid cells=3*4 length=.4,.8,1/')
     call grid_init(case%grid, case%boundary, state%grid)
     call flow_init(state%grid, state%flow)
     allocate (state%solid)

@@ -4,14 +4,16 @@ module test_energy_m
   use kinds_m, only: wp
   use energy_m, only: energy_t, energy_parts_t, energy_init, begin_energy, store_energy, &
     store_release, energy_excess
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: sides
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_energy
 
-  character(8), parameter :: sides(2, 3) = 'slip'
   real(wp), parameter :: tolerance = 1.0e-12_wp
+  character(*), parameter :: tank = '&grid cells=3*8 length=3*.8/ &shape name="b" kind="box" ' &
+    //'size=3*.2/ '
 
 contains
 
@@ -65,20 +67,15 @@ contains
   !> Not where a side moves, lets a stream in, is open below or beside, where gravity drives a
   !! period, or a block is driven.
   subroutine when_it_is_known()
-    type(one_body_t) :: fresh
+    character(*), parameter :: period = 'periodic periodic slip slip slip slip'
 
-    call check('closed tank', knows(fresh, 'slip', 'slip'))
-    call check('open top', knows(fresh, 'slip', 'open'))
-    call check('open side', .not. knows(fresh, 'open', 'slip'))
-    call check('period across gravity', knows(fresh, 'periodic', 'slip'))
-    fresh%case%boundary%velocity(1, 2, 3) = 0.1_wp
-    call check('moving lid', .not. knows(fresh, 'slip', 'no_slip'))
-    fresh%case%boundary%velocity = 0.0_wp
-    fresh%case%fluid%surface_tension = 0.07_wp
-    call check('surface tension', .not. knows(fresh, 'slip', 'slip'))
-    fresh%case%fluid%surface_tension = 0.0_wp
-    fresh%case%fluid%gravity = [1.0_wp, 0.0_wp, -9.0_wp]
-    call check('gravity along a period', .not. knows(fresh, 'periodic', 'slip'))
+    call check('closed tank', knows(sides('slip slip slip slip slip slip')))
+    call check('open top', knows(sides('slip slip slip slip slip open')))
+    call check('open side', .not. knows(sides('open open slip slip slip slip')))
+    call check('period across gravity', knows(sides(period)))
+    call check('moving lid', .not. knows('&boundary z_max="no_slip" z_max_velocity=.1,0,0/ '))
+    call check('surface tension', .not. knows('&fluid water_level=.1 surface_tension=.07/ '))
+    call check('gravity along a period', .not. knows(sides(period)//'&fluid gravity=1,0,-9/ '))
   end subroutine when_it_is_known
 
   !> A tank of liquids of one density has no energy to set free: round-off is no excess.
@@ -87,12 +84,8 @@ contains
     type(energy_t) :: book
     real(wp), parameter :: weight = 0.8_wp**4*1000.0_wp*9.81_wp   !! times a height of the tank [J]
 
-    call describe([8, 8, 8], [0.8_wp, 0.8_wp, 0.8_wp], sides, 'box', [0.2_wp, 0.2_wp, 0.2_wp], &
-                  [0.4_wp, 0.4_wp, 0.4_wp], box%case)
-    box%case%fluid%gas_density = box%case%fluid%liquid_density
-    box%case%fluid%gravity = [0.0_wp, 0.0_wp, -9.81_wp]
-    call place(box)
-    box%blocks%fixed = .true.
+    call place(tank//'&fluid gas_density=1000 liquid_density=1000/ &body shape="b" fixed=T ' &
+               //'position=3*.4/', box)
     call energy_init(box%case, box%grid, box%blocks, book)
     call begin_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), 0.0_wp, book)
     call store_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), book)
@@ -100,21 +93,13 @@ contains
     call check('round-off is no excess', energy_excess(book), 0.0_wp, 1.0e-12_wp)
   end subroutine nothing_set_free
 
-  logical function knows(settings, x, top)
-    type(one_body_t), intent(in) :: settings
-    character(*), intent(in) :: x, top
+  !> Is the energy of a tank with these groups known?
+  logical function knows(groups)
+    character(*), intent(in) :: groups
     type(one_body_t) :: box
     type(energy_t) :: book
-    character(8) :: kind(2, 3)
 
-    kind = sides
-    kind(:, 1) = x
-    kind(2, 3) = top
-    call describe([8, 8, 8], [0.8_wp, 0.8_wp, 0.8_wp], kind, 'box', [0.2_wp, 0.2_wp, 0.2_wp], &
-                  [0.4_wp, 0.4_wp, 0.4_wp], box%case)
-    box%case%fluid = settings%case%fluid
-    box%case%boundary%velocity = settings%case%boundary%velocity
-    call place(box)
+    call place(tank//'&body shape="b" position=3*.4/ '//groups, box)
     call energy_init(box%case, box%grid, box%blocks, book)
     knows = .not. ieee_is_nan(energy_excess(book))
   end function knows

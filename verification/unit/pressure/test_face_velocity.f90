@@ -6,18 +6,16 @@ module test_face_velocity_m
   use boundary_m, only: fill_velocity_halo
   use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
+  use merged_cells_m, only: merged_cells_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place, random_field
   use check_m, only: check
   implicit none
   private
   public :: test_face_velocity
 
-  character(8), parameter :: sides(2, 3) = 'slip'
-  integer, parameter :: cells(3) = [8, 8, 9]
-  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.9_wp]          !! cells of 0.1 m
-  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]      !! of the box [m]
+  integer, parameter :: cells(3) = [8, 8, 9]                         !! of 0.1 m
   real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.43_wp]     !! x from 0.21 to 0.57
   real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
     !! of the box [m/s, rad/s]
@@ -36,21 +34,15 @@ module test_face_velocity_m
 contains
 
   subroutine test_face_velocity()
-    call describe(cells, tank, sides, 'box', edges, middle, box%case)
-    call place(box)
+    call place('&grid cells=8,8,9 length=.8,.8,.9/ &shape name="b" kind="box" size=.36,.36,.37/ ' &
+               //'&body shape="b" position=.39,.4,.43/ '//slip, box, merged)
     box%bodies%motion(:, 1) = motion
     box%flow%mu = nu*box%flow%rho
-    call merged_cells_init(box%grid, merged)
-    call find_merged_cells(box%grid, box%solid, merged)
     call acceleration_init(box%grid, a)
+    call random_field(seed, a%face)
+    call random_field(seed, a%cell)
     do d = 1, 3
       box%flow%u(:, :, :, d) = stream(d)
-      do k = lbound(a%face, 3), ubound(a%face, 3)
-        do j = lbound(a%face, 2), ubound(a%face, 2)
-          call random_numbers(seed, a%face(:, j, k, d))
-          call random_numbers(seed, a%cell(:, j, k, d))
-        end do
-      end do
     end do
     call fill_velocity_halo(box%grid, box%flow%u)
     a%kicked = .true.

@@ -15,19 +15,17 @@ module test_pressure_m
   use pressure_extension_m, only: extend_pressure
   use advected_pressure_m, only: advect_pressure
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use case_text_m, only: sides, body
+  use one_body_m, only: one_body_t, place, random_field
   use check_m, only: check
   implicit none
   private
   public :: test_pressure
 
-  character(8), parameter :: closed(2, 3) = 'no_slip', &
-    tank(2, 3) = reshape([character(8) :: 'no_slip', 'no_slip', 'slip', 'slip', 'no_slip', &
-                          'open'], [2, 3]), &
-    channel(2, 3) = reshape([character(8) :: 'periodic', 'periodic', 'slip', 'slip', 'no_slip', &
-                             'open'], [2, 3])
+  character(*), parameter :: closed = 'no_slip no_slip no_slip no_slip no_slip no_slip', &
+    tank = 'no_slip no_slip slip slip no_slip open', &
+    channel = 'periodic periodic slip slip no_slip open'
   integer, parameter :: cells(3) = [12, 8, 12]
-  real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
   real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
   type(one_body_t), target :: box
@@ -38,10 +36,10 @@ module test_pressure_m
 contains
 
   subroutine test_pressure()
-    call held_box('closed box', closed, 'cg', 'multigrid')
-    call held_box('open tank', tank, 'cg', 'multigrid')
-    call held_box('jacobi', tank, 'cg', 'jacobi')
-    call held_box('bicgstab', tank, 'bicgstab', 'multigrid')
+    call held_box('closed box', closed, '')
+    call held_box('open tank', tank, '')
+    call held_box('jacobi', tank, 'preconditioner="jacobi"')
+    call held_box('bicgstab', tank, 'pressure_solver="bicgstab"')
     call rough_and_fine()
     call without_its_body()
     call free_box()
@@ -52,21 +50,25 @@ contains
     call carried_with_a_body()
   end subroutine test_pressure
 
-  !> A tilted box in liquid below and gas above, random face velocity through the open faces.
-  subroutine build(sides, free)
-    character(*), intent(in) :: sides(2, 3)
+  !> A box in liquid below and gas above, random face velocity through the open faces.
+  subroutine build(around, free, position, q, numerics)
+    character(*), intent(in) :: around   !! kinds of the sides
     logical, intent(in) :: free
-    type(one_body_t) :: fresh
+    real(wp), intent(in), optional :: position(3), q(4)   !! else tilted in the middle
+    character(*), intent(in), optional :: numerics
+    real(wp) :: x(3), attitude(4)
+    character(:), allocatable :: more
 
-    box = fresh
-    call describe(cells, length, sides, 'box', [0.043_wp, 0.031_wp, 0.037_wp], &
-                  [0.0613_wp, 0.0389_wp, 0.0571_wp], box%case)
-    box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
-    box%case%body(1)%fixed = .not. free
-    box%case%body(1)%velocity = [0.3_wp, -0.2_wp, -0.1_wp]
-    box%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
-    box%case%numerics%divergence_tolerance = 1.0e-8_wp
-    call place(box)
+    x = [0.0613_wp, 0.0389_wp, 0.0571_wp]
+    if (present(position)) x = position
+    attitude = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
+    if (present(q)) attitude = q
+    more = ''
+    if (present(numerics)) more = numerics
+    call place('&grid cells=12,8,12 length=.12,.08,.12/ &shape name="b" kind="box" ' &
+      //'size=.043,.031,.037/ &numerics divergence_tolerance=1e-8 '//more//'/ '//sides(around) &
+      //body('b', x, [0.3_wp, -0.2_wp, -0.1_wp], attitude, 'angular_velocity=2,1,-3 fixed=' &
+      //merge('F', 'T', free)), box)
     box%flow%c(:, :, 8:) = 0.0_wp
     box%flow%c(:, :, 7) = 0.3_wp
     call mix_fluid(box%case%fluid, box%flow)
@@ -76,18 +78,10 @@ contains
 
   !> Random face velocity, zero on walls, the same on both sides of a period.
   subroutine stir()
-    real(wp) :: row(cells(1) + 1)
-    integer :: j, k, d
-
-    do d = 1, 3
-      do k = 1, cells(3) + 1
-        do j = 1, cells(2) + 1
-          call random_numbers(seed, row)
-          box%flow%uf(1:cells(1) + 1, j, k, d) = 0.1_wp*row
-        end do
-      end do
-    end do
     associate (n => cells, uf => box%flow%uf)
+      uf = 0.0_wp
+      call random_field(seed, uf(1:n(1) + 1, 1:n(2) + 1, 1:n(3) + 1, :))
+      uf = 0.1_wp*uf
       uf(n(1) + 1, :, :, 1) = 0.0_wp
       uf(1, :, :, 1) = 0.0_wp
       uf(:, [1, n(2) + 1], :, 2) = 0.0_wp
@@ -139,16 +133,14 @@ contains
   end function largest_divergence
 
   !> A moving but held box: the fluid makes way, and the velocity has changed by -dt grad(phi)/rho.
-  subroutine held_box(name, sides, solver, preconditioner)
-    character(*), intent(in) :: name, sides(2, 3), solver, preconditioner
+  subroutine held_box(name, around, numerics)
+    character(*), intent(in) :: name, around, numerics
     real(wp), allocatable :: before(:, :, :, :)
     real(wp) :: expected
     integer, parameter :: at(3) = [3, 2, 7]
 
-    call build(sides, .false.)
+    call build(around, .false., numerics=numerics)
     if (name == 'closed box') box%bodies%motion = 0.0_wp
-    box%case%numerics%pressure_solver = solver
-    box%case%numerics%preconditioner = preconditioner
     allocate (before, source=box%flow%uf)
     call solve()
     call check(name//': converged', pressure%report%converged .and. &
@@ -170,8 +162,6 @@ contains
     type(pressure_report_t) :: both
 
     call build(tank, .false.)
-    box%case%numerics%pressure_solver = 'cg'
-    box%case%numerics%preconditioner = 'multigrid'
     call solve(tolerance=1.0e-5_wp)
     rough = pressure%report%iterations
     call check('rough: converged', pressure%report%converged)
@@ -246,13 +236,10 @@ contains
     real(wp) :: motion(6), force(6, 1), displaced
     integer, parameter :: open_cells = 12*8*12 - 4*2*3
 
-    call build(closed, .true.)
-    box%case%body(1)%quaternion = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    box%case%body(1)%position(3) = 0.018_wp
-    box%case%body(1)%angular_velocity = 0.0_wp
-    call place(box)
+    call build(closed, .true., [0.0613_wp, 0.0389_wp, 0.018_wp], [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+    box%bodies%motion(4:6, 1) = 0.0_wp
+    box%flow%c = 1.0_wp
     call mix_fluid(box%case%fluid, box%flow)
-    call stir()
     motion = box%bodies%motion(:, 1)
     call solve()
     call check('pressed box: converged', pressure%report%converged .and. &
@@ -403,8 +390,7 @@ contains
     box%solid%alpha = 0.0_wp
     a%kicked = .true.
     box%bodies%x(3, 1) = 0.02_wp   ! the floor is near
-    call set_bowl(0.0_wp)
-    box%flow%p = box%flow%p - slope()
+    call set_bowl()
     call fill_scalar_halo(box%grid, box%flow%p)
     before = box%flow%p
     call carry()
@@ -421,21 +407,6 @@ contains
   subroutine carry()
     call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, dt, a, box%flow%p)
   end subroutine carry
-
-  !> What a bowl without curvature adds to the pressure of the weight [Pa].
-  function slope() result(p)
-    real(wp) :: p(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                  1 - n_halo:cells(3) + n_halo)
-    integer :: i, j, k
-
-    do k = 1 - n_halo, cells(3) + n_halo
-      do j = 1 - n_halo, cells(2) + n_halo
-        do i = 1 - n_halo, cells(1) + n_halo
-          p(i, j, k) = bowl(([i, j, k] - 0.5_wp)*box%grid%h, 0.0_wp)
-        end do
-      end do
-    end do
-  end function slope
 
   !> Largest error of the open cells, but for those at the sides of the tank, beside which the
   !! pressure is that of a wall.
@@ -462,9 +433,9 @@ contains
     end do
   end function worst
 
-  !> Pressure of the weight and of a bowl everywhere.
+  !> Pressure of the weight everywhere, and of a bowl.
   subroutine set_bowl(curvature)
-    real(wp), intent(in) :: curvature
+    real(wp), intent(in), optional :: curvature
     real(wp) :: x(3)
     integer :: i, j, k
 
@@ -472,7 +443,8 @@ contains
       do j = 1 - n_halo, cells(2) + n_halo
         do i = 1 - n_halo, cells(1) + n_halo
           x = ([i, j, k] - 0.5_wp)*box%grid%h
-          box%flow%p(i, j, k) = dot_product(weight, x) + bowl(x, curvature)
+          box%flow%p(i, j, k) = dot_product(weight, x)
+          if (present(curvature)) box%flow%p(i, j, k) = box%flow%p(i, j, k) + bowl(x, curvature)
         end do
       end do
     end do

@@ -1,8 +1,8 @@
 !> What the length of a step follows, and what the transport carries.
 module test_courant_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t
-  use grid_m, only: grid_t, grid_init
+  use case_text_m, only: grid_of
+  use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_body_m, only: blocks_t
@@ -12,7 +12,6 @@ module test_courant_m
   private
   public :: test_courant
 
-  real(wp), parameter :: h(3) = [0.01_wp, 0.02_wp, 0.04_wp]
   type(grid_t) :: grid
   type(flow_t) :: flow
   type(solid_geometry_t) :: solid
@@ -56,13 +55,9 @@ contains
     call check('a face that is mostly closed is not looked at', rate%followed, 130.0_wp, 1.0e-10_wp)
   end subroutine test_courant
 
-  !> A box of 6 x 6 x 6 cells of unequal edges, all open, all gas, all at rest.
+  !> A box of cells of 0.01 x 0.02 x 0.04 m, all open, all gas, all at rest.
   subroutine stage()
-    type(case_t) :: case
-
-    case%grid%cells = [6, 6, 6]
-    case%grid%length = 6*h
-    call grid_init(case%grid, case%boundary, grid)
+    call grid_of('&grid cells=3*6 length=.06,.12,.24/', grid)
     call flow_init(grid, flow)
     call solid_geometry_init(grid, solid, 0)
     solid%aperture = 1.0_wp

@@ -1,9 +1,8 @@
-!> Whole steps: still water, length of the step, a release, noise in gas, a fall without fluid.
+!> Whole steps: water beside an outflow, a current, length of the step, a release, noise in gas.
 module test_step_m
   use kinds_m, only: wp
   use errors_m, only: to_text
   use liquid_fill_m, only: liquid_volume
-  use simulation_m, only: resume
   use boundary_m, only: fill_scalar_halo
   use one_body_m, only: random_numbers
   use world_m, only: world_t, set_up, body, run
@@ -17,7 +16,6 @@ module test_step_m
 contains
 
   subroutine test_step()
-    call still_water()
     call water_beside_outflow()
     call uniform_current()
     call moved_block()
@@ -28,8 +26,6 @@ contains
     call release_into_water()
     call noise_in_gas(0.0_wp, 1.0e-3_wp)
     call noise_in_gas(1.0_wp, 2.0e-3_wp)
-    call fall_without_fluid()
-    call go_on_from_the_state()
   end subroutine test_step
 
   !> Groups in a tank half full, with boxes of 4 cm; other variables of &run and &fluid.
@@ -52,27 +48,6 @@ contains
       //'/ &shape name="box" kind="box" size=.04,.03,.035'
     call set_up(text//'/ '//groups, sim)
   end subroutine tank
-
-  !> A held block through the level: nothing moves, no liquid is lost, and it is carried.
-  subroutine still_water()
-    type(world_t) :: sim
-    real(wp) :: before, mass
-
-    call tank('&body shape="box" position=.0613,.0389,.0571 fixed=T/', sim)
-    before = liquid_volume(sim%grid, sim%flow%liquid)
-    call run(sim, 3)
-    mass = 0.04_wp*0.03_wp*(998.2_wp*(0.0613_wp - 0.0396_wp) + 1.204_wp*(0.0746_wp - 0.0613_wp))
-    call check('still water: converged', sim%report%pressure_converged .and. &
-      sim%report%viscous_converged)
-    call check('still water: three steps', sim%clock%t, 6.0e-3_wp, 1.0e-15_wp)
-    call check('still water: no motion', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, :))), 0.0_wp, &
-               1.0e-8_wp)
-    call check('still water: volume', liquid_volume(sim%grid, sim%flow%liquid), before, &
-               1.0e-14_wp*before)
-    call check('still water: open space below the level', before, 0.12_wp*0.08_wp*0.0613_wp &
-               - 0.04_wp*0.03_wp*(0.0613_wp - 0.0396_wp), 1.0e-14_wp*before)
-    call check('still water: buoyancy', sim%blocks%fluid_force(3, 1), mass*g, 1.0e-6_wp*mass*g)
-  end subroutine still_water
 
   !> Water at rest at the level an outflow keeps, and a held block that sticks out of that side.
   subroutine water_beside_outflow()
@@ -270,40 +245,5 @@ contains
     call check('noise in gas: converged', sim%report%pressure_converged .and. &
       sim%report%viscous_converged)
   end subroutine fall_into_water
-
-  !> Without fluid a block falls by g t.
-  subroutine fall_without_fluid()
-    type(world_t) :: sim
-
-    call tank('&body shape="box" position=.0613,.0389,.08/', sim, 'dt=2e-3 physics="dry"')
-    call run(sim, 10)
-    call check('dry: speed', sim%blocks%v(3, 1), -g*0.02_wp, 1.0e-14_wp)
-    call check('dry: height', sim%blocks%x(3, 1), 0.08_wp - 0.5_wp*g*0.02_wp**2, 1.0e-15_wp)
-  end subroutine fall_without_fluid
-
-  !> What is worked out from the state is what a run without break has.
-  subroutine go_on_from_the_state()
-    type(world_t) :: whole, broken
-
-    call four_steps(0, whole)
-    call four_steps(3, broken)
-    call check('same velocity', all(abs(whole%flow%u - broken%flow%u) <= 0.0_wp))
-    call check('same liquid', all(abs(whole%flow%liquid - broken%flow%liquid) <= 0.0_wp))
-    call check('same block', all(abs(whole%blocks%x - broken%blocks%x) <= 0.0_wp))
-    call check('it moves', maxval(abs(whole%flow%u)) > 0.01_wp)
-  end subroutine go_on_from_the_state
-
-  !> A block falls through the level; before one step the solids and halos are worked out anew.
-  subroutine four_steps(anew, sim)
-    integer, intent(in) :: anew   !! number of that step, 0: none
-    type(world_t), intent(inout) :: sim
-    integer :: step
-
-    call tank('&body shape="box" position=.0613,.0389,.0771 velocity=.1,0,-.5/', sim)
-    do step = 1, 4
-      if (step == anew) call resume(sim%simulation_t)
-      call run(sim, 1)
-    end do
-  end subroutine four_steps
 
 end module test_step_m

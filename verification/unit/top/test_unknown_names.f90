@@ -6,6 +6,7 @@ module test_unknown_names_m
   use kinds_m, only: wp
   use check_m, only: check
   use case_types_m, only: case_t, place_t
+  use case_text_m, only: case_of
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use drops_m, only: place_of_block
@@ -67,14 +68,8 @@ contains
     type(place_t) :: place
     integer :: subcells
 
-    allocate (case%shape(1), case%body(1), case%drop(1))
-    case%shape%name = 'block'
-    case%shape%kind = 'cube'
-    case%shape(1)%size = 0.1_wp
-    case%body%shape = 'block'
-    case%drop%shape = 'block'
-    case%grid%cells = 4
-    case%grid%length = 1.0_wp
+    case = case_of('&grid cells=3*4 length=3*1/ &shape name="b" kind="cube" size=.1/ ' &
+      //'&body shape="b" position=3*.2/ &drop shape="b" position=3*.5/')
     associate (shape => case%shape(1), drop => case%drop(1), contact => case%contact, &
                numerics => case%numerics)
       select case (choice)

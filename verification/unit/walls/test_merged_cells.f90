@@ -4,20 +4,16 @@
 module test_merged_cells_m
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, is_unmerged, &
-    match_densities
+  use merged_cells_m, only: merged_cells_t, find_merged_cells, is_unmerged, match_densities
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place, random_numbers, random_field
   use check_m, only: check
   implicit none
   private
   public :: test_merged_cells
 
-  character(8), parameter :: sides(2, 3) = 'slip'
-  integer, parameter :: cells(3) = [8, 8, 7]
-  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.7_wp]         !! cells of 0.1 m
-  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
   real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]   !! x 0.21-0.57, y 0.22-0.58
   integer, parameter :: top = 4                                     !! open share 0.3 above the box
   real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
@@ -25,8 +21,8 @@ module test_merged_cells_m
   real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top cell over its target, from the wall
   type(one_body_t) :: box
   type(merged_cells_t) :: merged
-  real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                      1 - n_halo:cells(3) + n_halo, 3) :: u, before
+  real(wp), dimension(1 - n_halo:8 + n_halo, 1 - n_halo:8 + n_halo, 1 - n_halo:7 + n_halo, 3) :: &
+    u, before
   real(wp), allocatable :: mass(:), noted(:, :), to_wall(:, :)
   real(wp) :: total(3)
   integer :: seed = 77, m
@@ -34,13 +30,10 @@ module test_merged_cells_m
 contains
 
   subroutine test_merged_cells()
-    call describe(cells, tank, sides, 'box', edges, middle, box%case)
-    call place(box)
+    call place('&grid cells=8,8,7 length=.8,.8,.7/ &shape name="b" kind="box" ' &
+               //'size=.36,.36,.37/ &body shape="b" position=.39,.4,.185/ '//slip, box, merged)
     box%bodies%motion(:, 1) = motion
-    call merged_cells_init(box%grid, merged)
-    do m = 1, 2   ! the second time from what the first has left
-      call find_merged_cells(box%grid, box%solid, merged)
-    end do
+    call find_merged_cells(box%grid, box%solid, merged)   ! from what the first time has left
     call the_targets()
     allocate (mass(merged%n), noted(3, merged%n), to_wall(3, merged%n))
     call random_numbers(seed, mass)
@@ -78,7 +71,7 @@ contains
   !> Momentum, profile, and a fluid that moves with the box.
   subroutine the_shares()
     merged%slip = 1.0_wp
-    call fill(u)
+    call random_field(seed, u)
     total = momentum(u)
     call share()
     call check('the momentum is kept', momentum(u), total, 1.0e-11_wp*sum(mass))
@@ -89,7 +82,7 @@ contains
     call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
                u(4, 5, top + 1, 1:2), 1.0e-12_wp)
     merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the small cell
-    call fill(u)
+    call random_field(seed, u)
     total = momentum(u)
     before = u
     call share()
@@ -158,7 +151,7 @@ contains
 
     box%flow%rho(4, 5, top) = 3.0_wp
     box%flow%rho(4, 5, top + 1) = 1.0_wp
-    call fill(u)
+    call random_field(seed, u)
     before = u
     call share_acceleration(box%grid, box%solid%aperture, box%flow%rho, merged, u)
     w = 3.0_wp*0.5_wp   ! its lower face is closed
@@ -181,7 +174,7 @@ contains
 
     small = merged%number(4, 5, top)
     t = r + (1.0_wp - r)*0.25_wp
-    call fill(u)
+    call random_field(seed, u)
     call report()
     before = u
     u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
@@ -275,19 +268,5 @@ contains
     v = wall_velocity(motion, 0.1_wp*([i, j, top] - 0.5_wp) - middle)
     velocity = v(d)
   end function wall
-
-  !> Numbers between -1 and 1.
-  subroutine fill(a)
-    real(wp), intent(out) :: a(:, :, :, :)
-    integer :: j, k, d
-
-    do d = 1, 3
-      do k = 1, size(a, 3)
-        do j = 1, size(a, 2)
-          call random_numbers(seed, a(:, j, k, d))
-        end do
-      end do
-    end do
-  end subroutine fill
 
 end module test_merged_cells_m

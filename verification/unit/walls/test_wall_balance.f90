@@ -12,21 +12,21 @@ module test_wall_balance_m
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: mass_defect, held_mass
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
+  use merged_cells_m, only: merged_cells_t, order_by_body
   use merged_momentum_m, only: share_acceleration
   use half_kick_m, only: force_of_half_kick
   use wall_balance_m, only: wall_balance_t, begin_balance, add_push, &
     force_of_walls
-  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use errors_m, only: to_text
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place, random_numbers, random_field
   use check_m, only: check
   implicit none
   private
   public :: test_wall_balance
 
-  character(8), parameter :: sides(2, 3) = 'slip'
   integer, parameter :: cells(3) = [8, 8, 9]
   real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.9_wp]         !! cells of 0.1 m
-  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
   real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.43_wp]    !! z 0.245-0.615
   real(wp), parameter :: dt = 0.02_wp                               !! [s]
   real(wp), parameter :: gained(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
@@ -43,12 +43,7 @@ module test_wall_balance_m
 contains
 
   subroutine test_wall_balance()
-    call describe(cells, tank, sides, 'box', edges, middle, box%case)
-    call place(box)
-    box%flow%fluid_volume = box%grid%volume*(1.0_wp - box%solid%alpha)
-    box%flow%liquid = box%flow%fluid_volume
-    call merged_cells_init(box%grid, merged)
-    call find_merged_cells(box%grid, box%solid, merged)
+    call place_box(0.43_wp, box, merged)
     call acceleration_init(box%grid, a)
     allocate (kick, mold=a%cell)
     at_start = box%bodies
@@ -196,7 +191,7 @@ contains
     real(wp) :: from_faces(3), of_fluid(3), forces(6, 2)
 
     call begin()
-    call fill(a%cell)
+    call random_field(seed, a%cell)
     call add_push(box%grid, merged, dt, a%cell, balance)
     from_faces = 0.0_wp
     do m = 1, merged%n
@@ -228,6 +223,7 @@ contains
   !> The two halves of the old pressure: where they are the same, no force; else what was given on
   !! the surface of the start less what would be on that of the end, wherever there was a wall.
   subroutine two_halves()
+    type(one_body_t) :: elsewhere
     type(merged_cells_t) :: before
     real(wp) :: sums(3), mass
     integer :: i, j, k
@@ -235,7 +231,7 @@ contains
     before = merged
     a%kicked = .true.
     call begin()
-    call fill(a%cell)
+    call random_field(seed, a%cell)
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
@@ -248,7 +244,7 @@ contains
     call check('equal halves: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
 
     ! The box was elsewhere; a cell gets no second half.
-    call move_box(0.13_wp, before)
+    call place_box(0.56_wp, elsewhere, before)
     a%kicked(6, 4, 5) = .false.
     sums = 0.0_wp
     do k = 1, cells(3)
@@ -274,30 +270,15 @@ contains
                                a, kick)
   end subroutine find_halves
 
-  !> The merged cells of the box lifted by `way`.
-  subroutine move_box(way, lifted)
-    real(wp), intent(in) :: way   !! [m]
-    type(merged_cells_t), intent(out) :: lifted
-    type(one_body_t) :: other
+  !> The box at a height.
+  subroutine place_box(z, at_height, merged_there)
+    real(wp), intent(in) :: z   !! [m]
+    type(one_body_t), intent(out) :: at_height
+    type(merged_cells_t), intent(out) :: merged_there
 
-    call describe(cells, tank, sides, 'box', edges, middle + [0.0_wp, 0.0_wp, way], other%case)
-    call place(other)
-    call merged_cells_init(other%grid, lifted)
-    call find_merged_cells(other%grid, other%solid, lifted)
-  end subroutine move_box
-
-  !> Numbers between -1 and 1.
-  subroutine fill(b)
-    real(wp), intent(out) :: b(:, :, :, :)
-    integer :: j, k, d
-
-    do d = 1, 3
-      do k = 1, size(b, 3)
-        do j = 1, size(b, 2)
-          call random_numbers(seed, b(:, j, k, d))
-        end do
-      end do
-    end do
-  end subroutine fill
+    call place('&grid cells=8,8,9 length=.8,.8,.9/ &shape name="b" kind="box" ' &
+      //'size=.36,.36,.37/ &body shape="b" position=.39,.4,'//to_text(z)//'/ '//slip, &
+      at_height, merged_there)
+  end subroutine place_box
 
 end module test_wall_balance_m

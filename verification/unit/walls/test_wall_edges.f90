@@ -2,15 +2,16 @@
 !! the edges of an upright box, and none of a sphere.
 module test_wall_edges_m
   use kinds_m, only: wp
+  use errors_m, only: to_text
   use wall_plane_m, only: apertures_of_plane
   use effective_aperture_m, only: more_inertia
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_wall_edges
 
-  character(8), parameter :: sides(2, 3) = 'slip'
   type(one_body_t) :: body
 
 contains
@@ -36,7 +37,7 @@ contains
 
   !> x and y from 0.24 to 0.53, z from 0.21 to 0.57, cells of 0.1.
   subroutine upright_box()
-    call build('box', [0.29_wp, 0.29_wp, 0.36_wp], [0.385_wp, 0.385_wp, 0.39_wp])
+    call build('kind="box" size=.29,.29,.36', 'position=.385,.385,.39')
     call check('along a flat side', edge([6, 4, 4]) + edge([4, 6, 4]) + edge([4, 4, 3]), 0.0_wp, &
                0.0_wp)
     call check('an edge that holds the centre of its cell', edge([3, 3, 4]), 1.0_wp, 0.0_wp)
@@ -92,7 +93,8 @@ contains
   subroutine turned_box()
     real(wp), parameter :: width = 0.4_wp*sqrt(2.0_wp)
 
-    call build('box', [width, width, 0.4_wp], [0.5_wp, 0.5_wp, 0.5_wp], turned=.true.)
+    call build('kind="box" size='//to_text([width, width, 0.4_wp]), 'position=3*.5 axis=0,0,1 ' &
+               //'angle_deg=45')
     call check('plane walls', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 1.0e-9_wp)
     call check('there are some', body%solid%n_cut > 10)
     call check('no held fluid', maxval(abs(body%solid%aperture - body%solid%effective)), 0.0_wp, &
@@ -101,24 +103,18 @@ contains
 
   !> Eight cells wide.
   subroutine sphere()
-    call build('sphere', [0.8_wp, 0.0_wp, 0.0_wp], [0.513_wp, 0.487_wp, 0.505_wp])
+    call build('kind="sphere" size=.8', 'position=.513,.487,.505')
     call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 0.0_wp)
     call check('sphere: little held fluid', &
                maxval(body%solid%aperture - body%solid%effective) < 0.1_wp)
   end subroutine sphere
 
-  subroutine build(kind, size, position, turned)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3), position(3)   !! [m]
-    logical, intent(in), optional :: turned
-    type(one_body_t) :: fresh
-    real(wp), parameter :: eighth = atan(1.0_wp)/2.0_wp
+  !> Variables of &shape and &body.
+  subroutine build(shape, variables)
+    character(*), intent(in) :: shape, variables
 
-    body = fresh
-    call describe([10, 10, 10], [1.0_wp, 1.0_wp, 1.0_wp], sides, kind, size, position, body%case)
-    body%case%shape(1)%refinement = 5
-    if (present(turned)) body%case%body(1)%quaternion = [cos(eighth), 0.0_wp, 0.0_wp, sin(eighth)]
-    call place(body)
+    call place('&grid cells=3*10 length=3*1/ &shape name="b" refinement=5 '//shape &
+               //'/ &body shape="b" '//variables//'/ '//slip, body)
   end subroutine build
 
   real(wp) function edge(c)

@@ -1,23 +1,22 @@
 !> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
 module test_wall_shear_m
-  use kinds_m, only: wp, pi
+  use kinds_m, only: wp
   use wall_plane_m, only: distance_of_links
   use wall_layer_m, only: find_wall_speeds, rough_viscosity
   use viscous_links_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
+  use merged_cells_m, only: merged_cells_t
   use rigid_motion_m, only: wall_velocity
-  use one_body_m, only: one_body_t, describe, place
+  use case_text_m, only: slip
+  use one_body_m, only: one_body_t, place
   use check_m, only: check
   implicit none
   private
   public :: test_wall_shear
 
-  integer, parameter :: cells(3) = 10
+  character(*), parameter :: tank = '&grid cells=3*10 length=3*1/ '//slip
   real(wp), parameter :: h = 0.1_wp
-  character(8), parameter :: sides(2, 3) = 'slip'
   real(wp), parameter :: middle(3) = [0.39_wp, 0.35_wp, 0.45_wp]   !! of the box [m]
-  real(wp), parameter :: edges(3) = [0.36_wp, 0.46_wp, 0.46_wp]    !! x: .21 to .57 [m]
   real(wp), parameter :: motion(6) = [0.3_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.5_wp]
     !! of the box [m/s, rad/s]
   real(wp), parameter :: stream(3) = [1.1_wp, 0.4_wp, -0.2_wp]     !! [m/s]
@@ -32,15 +31,12 @@ module test_wall_shear_m
 contains
 
   subroutine test_wall_shear()
-    call describe(cells, [1.0_wp, 1.0_wp, 1.0_wp], sides, 'box', edges, middle, box%case)
-    call place(box)
+    call place(tank//'&shape name="b" kind="box" size=.36,.46,.46/ &body shape="b" ' &
+      //'position=.39,.35,.45 velocity=.3,0,0 angular_velocity=0,0,.5/', box, merged)   ! x .21-.57
     rho = box%case%fluid%liquid_density
-    box%bodies%motion(:, 1) = motion
     do d = 1, 3
       box%flow%u(:, :, :, d) = stream(d)
     end do
-    call merged_cells_init(box%grid, merged)
-    call find_merged_cells(box%grid, box%solid, merged)
     merged%centre = 1.0_wp
     call find_wall_speeds(box%grid, box%solid, box%bodies, box%flow%u, merged)
     speed = merged%wall_speed
@@ -104,10 +100,8 @@ contains
     integer, parameter :: beside_wall(3) = [8, 7, 5]   !! 0.25 and 0.15 m from the middle
     type(one_body_t) :: cube
 
-    call describe(cells, [1.0_wp, 1.0_wp, 1.0_wp], sides, 'cube', [0.5_wp, 0.0_wp, 0.0_wp], &
-                  [0.5_wp, 0.5_wp, 0.5_wp], cube%case)
-    cube%case%body(1)%quaternion = [cos(pi/12.0_wp), 0.0_wp, 0.0_wp, sin(pi/12.0_wp)]
-    call place(cube)
+    call place(tank//'&shape name="c" kind="cube" size=.5/ &body shape="c" position=3*.5 ' &
+               //'axis=0,0,1 angle_deg=30/', cube)
     call check('distance from an oblique wall', &
                distance_of_links(cube%grid, cube%solid, beside_wall), &
                0.25_wp*cos_30 + 0.15_wp*0.5_wp - 0.25_wp, 1.0e-12_wp)
