@@ -9,7 +9,9 @@ from pathlib import Path
 import h5py
 import pytest
 
+from micstools.reading.reader import Run
 from run_cases import CASES, ROOT, Machine, run
+from same_bits import but_restarts, differences
 
 SharedRun = Callable[[str, Machine], Path]
 
@@ -69,3 +71,14 @@ def results(work: Path, case: str) -> h5py.File:
     done = mics(work, case)
     assert done.returncode == 0, done.stderr
     return h5py.File(work / "mics-out" / "run.h5")
+
+
+def after_restart(work: Path, case: str) -> list[str]:
+    """What differs after going on from the older of two restart files, in a copy; the runs may
+    warn."""
+    code, said = told(work, case, "--output", "whole")
+    assert code == 0, said
+    assert all(line.startswith("mics: warning: ") for line in said.splitlines())
+    older, _ = Run(work / "whole").restart_files
+    assert told(work, case, "--restart", f"whole/{older}", "--output", "again")[0] == 0
+    return but_restarts(differences(work / "whole", work / "again"))

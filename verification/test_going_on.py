@@ -12,9 +12,8 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools.reading.reader import Run
 from run_cases import CASES
-from same_bits import but_restarts, differences
+from shared_runs import after_restart
 from shared_runs import told as mics
 
 WET = """&run t_end = {t_end}  dt = 0.01  restart_interval = 0.01  field_interval = 0.01 /
@@ -40,23 +39,12 @@ def numbers(path: Path) -> dict[str, np.ndarray]:
         }
 
 
-def go_on(tmp_path: Path, case: str) -> list[str]:
-    """What differs after going on from the older of two restart files, in a copy; the runs may
-    warn."""
-    code, said = mics(tmp_path, case, "--output", "whole")
-    assert code == 0
-    assert all(line.startswith("mics: warning: ") for line in said.splitlines())
-    older, _ = Run(tmp_path / "whole").restart_files
-    assert mics(tmp_path, case, "--restart", f"whole/{older}", "--output", "again")[0] == 0
-    return but_restarts(differences(tmp_path / "whole", tmp_path / "again"))
-
-
 @pytest.mark.parametrize("coupling", ["monolithic", "mics"])
 def test_outflow_with_the_predictor_of_the_paper(coupling: str, tmp_path: Path) -> None:
     """It asks for what is outside the tank at the start of a step."""
     case = (CASES / "ranks" / "current.nml").read_text()
     case += f"&numerics momentum = 'c_ismac'  coupling = '{coupling}' /\n"
-    assert go_on(tmp_path, case) == []
+    assert after_restart(tmp_path, case) == []
 
 
 def test_fast_small_blocks(tmp_path: Path) -> None:
@@ -76,7 +64,7 @@ def test_fast_small_blocks(tmp_path: Path) -> None:
         u, v, w, spin = (chance.uniform(*ends) for ends in ((-1, 1), (-1, 1), (-3, 0), (-30, 30)))
         case += f"&body shape = 'a'  position = {x:.6f}, {y:.6f}, {z:.6f}\n"
         case += f"  velocity = {u:.4f}, {v:.4f}, {w:.4f}  angular_velocity = {spin:.2f}, 0, 5 /\n"
-    assert go_on(tmp_path, case) == []
+    assert after_restart(tmp_path, case) == []
 
 
 def test_another_shape_file_is_refused(tmp_path: Path) -> None:

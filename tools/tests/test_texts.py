@@ -1,15 +1,17 @@
-"""README, guide, gallery, architecture and all other texts: what they show works, what they name is
-there, the stages of a step are those of its code, the version to cite is that of the program."""
+"""README, guide, gallery, architecture and all other texts: what they show works, what they name
+is there, stages, versions and constants are those of the sources, links of built pages are good."""
 
 import argparse
 import os
 import re
 import subprocess
 import sys
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
+from check_links import broken_links
+from doc_pages import IN_SITE, Links, Page, pages, with_links
 from fences import fences
 from micstools import cli
 from micstools.cases import settings
@@ -167,3 +169,161 @@ def test_the_table_of_tools_holds_tools() -> None:
     named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
     assert len(named) > 10
     assert named <= set(cli.COMMANDS)
+
+
+PAGE = Page(PurePosixPath("docs/theory.md"), "page/theory")
+
+
+def linked(text: str) -> tuple[str, list[str]]:
+    """A text of docs/ with its links, and what is wrong with them."""
+    links = Links(pages())
+    return with_links(PAGE, text, links), links.problems
+
+
+@pytest.mark.parametrize(
+    ("text", "url"),
+    [
+        ("[x](../README.md)", "index.html"),
+        ("[x](figures/pile.png)", "media/pile.png"),
+        ("`src/grid/mixture.f90`", "module/mixture_m.html"),
+        ("`grid/mixture.f90`", "module/mixture_m.html"),
+        ("`mixture.f90`", "module/mixture_m.html"),
+        ("`src/mics.f90`", "program/mics.html"),
+        ("`input/blocks.nml`", "files/input/blocks.nml"),
+    ],
+)
+def test_names_become_links(text: str, url: str) -> None:
+    found, problems = linked(text)
+    assert problems == []
+    assert found.endswith(f"]({IN_SITE}/{url})")
+
+
+@pytest.mark.parametrize("text", ["[x](../NOTHING.md)", "`grid/nothing.f90`", "`nothing.f90`"])
+def test_names_of_no_file_are_found(text: str) -> None:
+    found, problems = linked(text)
+    assert found == text
+    assert len(problems) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[x](https://example.org/a.md)",
+        "[x](#part)",
+        "`case.nml`",
+        "`law_NAME.f90`",
+        "```\n`no/file.f90`\n```",
+    ],
+)
+def test_what_is_left_alone(text: str) -> None:
+    assert linked(text) == (text, [])
+
+
+def test_all_texts_name_files_that_are_there() -> None:
+    links = Links(pages())
+    for page in pages():
+        with_links(page, (ROOT / page.source).read_text(), links)
+    assert links.problems == []
+
+
+@pytest.mark.parametrize(
+    ("link", "problem"),
+    [
+        ('<a href="b.html">', ""),
+        ('<a href="b.html#part">', ""),
+        ('<a href="https://example.org">', ""),
+        ('<a href="c.html">', "no such file: c.html"),
+        ('<a href="../a.html">', "no such file: ../a.html"),
+        ('<a href="b.html#other">', "no such part: b.html#other"),
+        ('<img src="c.png">', "no such file: c.png"),
+        ('<script src="https://example.org/x.js"></script>', "loaded from a server"),
+    ],
+)
+def test_broken_links(link: str, problem: str, tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(link)
+    (tmp_path / "b.html").write_text('<p id="part">')
+    found = broken_links(tmp_path)
+    assert len(found) == (1 if problem else 0)
+    assert all(problem in line for line in found)
+
+
+LIST = ROOT / "docs" / "constants.md"
+DECLARED = re.compile(r"^ *real\([ws]p\), parameter(?:, \w+)* :: (.*)$", re.MULTILINE)
+ROW = re.compile(r"^\| `([\w/]+\.f90)` `(\w+)` \| `([^`]+)` \|(.*)\|$", re.MULTILINE)
+NO_CONSTANTS = {
+    "base/kinds.f90": {"pi"},
+    # what follows from geometry alone
+    "shapes/armour_units.f90": {"cosine", "sine"},
+    "shapes/shapes_builtin.f90": {"golden"},
+    "shapes/contact_sphere_placement.f90": {"turn"},
+    # a ratio of two constants of the page
+    "blocks/contact_response.f90": {"share"},
+    # marks for "none"
+    "shapes/surface_search.f90": {"nowhere"},
+    "case/allowed_values.f90": {"boundless"},
+    "case/case_types.f90": {"absent"},
+    "liquid/extended_fraction.f90": {"unknown"},
+    "liquid/liquid_fill.f90": {"no_surface"},
+    "grid/outflow.f90": {"elsewhere"},
+    "coupling/voxels.f90": {"no_hit"},
+    "momentum/surface_heights.f90": {"no_height"},
+}
+
+
+def declared(text: str) -> dict[str, str]:
+    """Single real constants of a source with their values, without the kind of the literals."""
+    text = re.sub(r"&[ \t]*(?:!.*)?\n\s*", "", text)
+    found = {}
+    for line in DECLARED.findall(text):
+        names = re.split(r",\s*(?=\w+(?:\([^)]*\))?\s*=[^=])", line.split("!")[0])
+        for name, value in (each.split("=", 1) for each in names):
+            if "(" not in name:
+                found[name.strip()] = re.sub(r"_[ws]p\b", "", value).strip()
+    return found
+
+
+def constants(source: Path) -> dict[tuple[str, str], str]:
+    """All that the page has to explain."""
+    found = {}
+    for path in sorted(source.rglob("*.f90")):
+        file = str(path.relative_to(source))
+        for name, value in declared(path.read_text()).items():
+            if name not in NO_CONSTANTS.get(file, set()):
+                found[file, name] = value
+    return found
+
+
+def explained(page: str) -> dict[tuple[str, str], str]:
+    """Constants of the page with their values."""
+    return {(file, name): value for file, name, value, _ in ROW.findall(page)}
+
+
+def test_every_constant_is_on_the_page() -> None:
+    found, told = constants(ROOT / "src"), explained(LIST.read_text())
+    assert sorted(found.keys() - told.keys()) == [], "missing on the page"
+    assert sorted(told.keys() - found.keys()) == [], "no longer in src"
+    other = {key: (told[key], found[key]) for key in found if told[key] != found[key]}
+    assert other == {}, "page and src differ"
+
+
+def test_every_row_is_complete() -> None:
+    """No cell is empty, and what is no constant is still there."""
+    for file, name, _, rest in ROW.findall(LIST.read_text()):
+        assert all(cell.strip() for cell in rest.split("|")), f"{file} {name}"
+    for file, names in NO_CONSTANTS.items():
+        assert names <= declared((ROOT / "src" / file).read_text()).keys(), file
+
+
+def test_constants_are_found(tmp_path: Path) -> None:
+    (tmp_path / "a.f90").write_text(
+        "  real(wp), parameter :: one = 1.0_wp/3.0_wp, two = max(1.0_wp, 2.0_wp)   !! three = 3\n"
+        "  real(wp), parameter, public :: four = &   ! of\n    4.0e-2_wp\n"
+        "  real(wp), parameter :: table(2) = [1.0_wp, 2.0_wp]\n"
+        "  integer, parameter :: five = 5\n    real(sp), parameter :: six = 6.0_sp\n"
+    )
+    assert constants(tmp_path) == {
+        ("a.f90", "one"): "1.0/3.0",
+        ("a.f90", "two"): "max(1.0, 2.0)",
+        ("a.f90", "four"): "4.0e-2",
+        ("a.f90", "six"): "6.0",
+    }
