@@ -125,7 +125,14 @@ def test_a_small_stack_is_enough(name: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("size", ["16k", " 16 K", "16", "16384B", "32k"])
+@pytest.mark.parametrize("size", ["2m", "1G", "", "k", "-1", "1.5M", "16kb"])
+def test_a_stack_that_is_large_or_none(size: str, tmp_path: Path) -> None:
+    """What the library takes as large, or does not take."""
+    given = {**os.environ, "OMP_STACKSIZE": size}
+    assert program("--check", cwd=tmp_path, input=SMALL, env=given).returncode == 0
+
+
+@pytest.mark.parametrize("size", ["16k", " 16 K", "16", "16384B", "32k", "0"])
 def test_a_stack_that_is_too_small_is_refused(size: str, tmp_path: Path) -> None:
     """Of a thread and of the program: exit code 2 and what is needed, nothing written."""
     done = program(cwd=tmp_path, input=SMALL, env={**os.environ, "OMP_STACKSIZE": size})

@@ -650,12 +650,15 @@ def test_damaged_restart(wet: Path, tmp_path: Path) -> None:
 
 
 def test_changed_case(wet: Path, tmp_path: Path) -> None:
-    """t_end may be raised and intervals may change; nothing else."""
+    """t_end may be raised, to what lies ahead, and intervals may change; nothing else."""
     other = tmp_path / "other.nml"
     other.write_text(CASE.read_text().replace("water_level = 0.0913", "water_level = 0.09"))
     code, said = run(tmp_path / "copy", "--restart", wet / "restart-a.h5", case=other)
     assert code == 2
     assert "water_level" in said
+    other.write_text(CASE.read_text().replace("t_end = 0.08", "t_end = 0.01"))
+    code, said = run(tmp_path / "copy", "--restart", wet / "restart-b.h5", case=other)
+    assert (code, "&run t_end: the restart file is already past it" in said) == (2, True)
     longer = CASE.read_text().replace("t_end = 0.08", "t_end = 0.09")
     other.write_text(longer.replace("field_interval = 0.02", "field_interval = 0.01"))
     shutil.copytree(wet, tmp_path / "longer")

@@ -1,8 +1,8 @@
-!> Problems are kept in order with what, value, what is allowed and the line; numbers stay short.
+!> Numbers as text stay short and read back. Messages: `verification/messages`.
 module test_errors_m
   use kinds_m, only: wp
   use check_m, only: check
-  use errors_m, only: problems_t, to_text
+  use errors_m, only: to_text
   implicit none
   private
   public :: test_errors
@@ -10,38 +10,6 @@ module test_errors_m
 contains
 
   subroutine test_errors()
-    call test_messages()
-    call test_number_text()
-  end subroutine test_errors
-
-  subroutine test_messages()
-    type(problems_t) :: problems
-    character(200) :: line
-    integer :: i, unit
-
-    call problems%add('&run dt', -1.0_wp, 'must be positive [s]', line=3)
-    call problems%add('&grid cells', 0, 'must be at least 1')
-    call problems%add('&body fixed', .true., 'not possible here', 12)
-    call problems%add('&shape kind', 'hexapot ', "must be 'hexapod'")
-    do i = 1, 30
-      call problems%add_message('more')
-    end do
-    call check('count', problems%n, 34)
-    call check('real', problems%message(1) == '&run dt = -1: must be positive [s] (line 3)')
-    call check('integer', problems%message(2) == '&grid cells = 0: must be at least 1')
-    call check('logical', &
-      problems%message(3) == '&body fixed = .true.: not possible here (line 12)')
-    call check('character', problems%message(4) == "&shape kind = 'hexapot': must be 'hexapod'")
-    call check('growth', problems%message(34) == 'more')
-    open (newunit=unit, status='scratch')
-    call problems%report(unit)
-    rewind (unit)
-    read (unit, '(a)') line
-    call check('report', line == 'mics: &run dt = -1: must be positive [s] (line 3)')
-    close (unit)
-  end subroutine test_messages
-
-  subroutine test_number_text()
     real(wp) :: x, y
     character(40) :: line
     integer :: i, unequal
@@ -66,6 +34,6 @@ contains
       if (abs(y - x) > 0) unequal = unequal + 1
     end do
     call check('reading back gives the same number', unequal, 0)
-  end subroutine test_number_text
+  end subroutine test_errors
 
 end module test_errors_m

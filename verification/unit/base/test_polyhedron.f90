@@ -4,13 +4,13 @@ module test_polyhedron_m
   use check_m, only: check
   use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, polyhedron_of_box, cut_polyhedron, &
     polyhedron_moments, polyhedron_moments_below, tet_volume, tet_moments_below, &
-    clip_tet_to_box, box_clip_moments_below
-  use polyhedron_sections_m, only: polyhedron_section
+    box_clip_moments_below
+  use random_counter_m, only: uniform
   implicit none
   private
   public :: test_polyhedron
 
-  integer :: seed_value = 12345
+  integer :: n_drawn = 0
 
 contains
 
@@ -19,28 +19,17 @@ contains
     call tet_below_plane()
     call plane_through_corners()
     call cells_fill_the_tet()
-    call sections()
-    call volume_from_sections()
   end subroutine test_polyhedron
 
-  !> Repeatable number in 0..1.
-  function draw() result(r)
-    real(wp) :: r
-
-    seed_value = mod(16807*mod(seed_value, 127773) - 2836*(seed_value/127773), 2147483647)
-    if (seed_value <= 0) seed_value = seed_value + 2147483647
-    r = real(seed_value, wp)/2147483647.0_wp
-  end function draw
-
+  !> Random points of the unit cube, the same in each run.
   function draw_points(m) result(x)
     integer, intent(in) :: m
     real(wp) :: x(3, m)
     integer :: d, v
 
     do v = 1, m
-      do d = 1, 3
-        x(d, v) = draw()
-      end do
+      n_drawn = n_drawn + 1
+      x(:, v) = [(uniform(12345, n_drawn, d), d=1, 3)]
     end do
   end function draw_points
 
@@ -177,51 +166,5 @@ contains
     end do
     call check('cells fill the tetrahedron below a plane', worst, [0.0_wp, 0.0_wp], 1e-15_wp)
   end subroutine cells_fill_the_tet
-
-  subroutine sections()
-    type(polyhedron_t) :: p
-    real(wp) :: area, x(3), c(3, 4)
-
-    call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 2.0_wp, 3.0_wp], p)
-    call polyhedron_section(p, [0.0_wp, 2.0_wp, 0.0_wp], 1.0_wp, area, x)
-    call check('section of a box', area, 3.0_wp, 1e-15_wp)
-    call check('its centroid', x, [0.5_wp, 0.5_wp, 1.5_wp], 1e-15_wp)
-    call polyhedron_section(p, [1.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, area, x)
-    call check('section in the lower face', area, 6.0_wp, 1e-15_wp)
-    call polyhedron_section(p, [1.0_wp, 0.0_wp, 0.0_wp], 1.0_wp, area, x)
-    call check('none in the upper face', area, 0.0_wp, 0.0_wp)
-    c = 0.0_wp
-    c(1, 2) = 1.0_wp
-    c(2, 3) = 1.0_wp
-    c(3, 4) = 1.0_wp
-    call clip_tet_to_box(c, [0.0_wp, 0.0_wp, 0.0_wp], [0.5_wp, 0.5_wp, 0.5_wp], p)
-    call polyhedron_section(p, [0.0_wp, 0.0_wp, 1.0_wp], 0.25_wp, area, x)
-    call check('section of a clipped tetrahedron', area, 0.25_wp - 0.125_wp*0.25_wp, 1e-15_wp)
-  end subroutine sections
-
-  !> The volume is the integral of the cross-section over the height (three Gauss points).
-  subroutine volume_from_sections()
-    real(wp), parameter :: node(3) = [-sqrt(0.6_wp), 0.0_wp, sqrt(0.6_wp)]
-    real(wp), parameter :: low = 0.2_wp, high = 0.9_wp
-    type(polyhedron_t) :: p
-    real(wp) :: c(3, 4), area(3), x(3), volume, moment(3), worst, z, sum_of_sections
-    integer :: t, g
-
-    worst = 0.0_wp
-    do t = 1, 50
-      c = draw_points(4)
-      c(3, 1:2) = low    ! two level edges: the section is one quadratic in between
-      c(3, 3:4) = high
-      call polyhedron_of_tet(c, p)
-      call polyhedron_moments(p, volume, moment)
-      do g = 1, 3
-        z = 0.5_wp*(low + high) + 0.5_wp*(high - low)*node(g)
-        call polyhedron_section(p, [0.0_wp, 0.0_wp, 1.0_wp], z, area(g), x)
-      end do
-      sum_of_sections = (high - low)*(5.0_wp*area(1) + 8.0_wp*area(2) + 5.0_wp*area(3))/18.0_wp
-      worst = max(worst, abs(sum_of_sections - volume))
-    end do
-    call check('volume is the integral of the sections', worst, 0.0_wp, 1e-15_wp)
-  end subroutine volume_from_sections
 
 end module test_polyhedron_m

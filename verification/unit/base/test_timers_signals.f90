@@ -16,11 +16,6 @@ module test_timers_signals_m
       implicit none
       integer(c_int), value :: number
     end function c_raise
-
-    integer(c_int) function c_getpid() bind(c, name='getpid')
-      import :: c_int
-      implicit none
-    end function c_getpid
   end interface
 
 contains
@@ -66,46 +61,6 @@ contains
     call check('interrupt', signal_caught(), 2)
     info = c_raise(int(signal_terminate, c_int))
     call check('terminate', signal_caught(), 15)
-    call check_names()
   end subroutine test_signals
-
-  !> What a shell calls by its name arrives with the number that the system gives it: no signal that
-  !! should end a run in good order kills it.
-  subroutine check_names()
-    character(*), parameter :: names(6) = [character(4) :: 'HUP', 'INT', 'USR1', 'PIPE', 'TERM', &
-      'XCPU']
-    character(12) :: number
-    integer :: i, status
-
-    write (number, '(i0)') c_getpid()
-    do i = 1, size(names)
-      call send(trim(names(i)), trim(number))
-      call execute_command_line('test "$(kill -l '//text_of(128 + signal_caught())//')" = ' &
-        //trim(names(i)), exitstat=status)
-      call check('caught '//names(i), status, 0)
-    end do
-    status = signal_caught()
-    call send('XFSZ', trim(number))
-    call check('a file too large asks for no end', signal_caught(), status)
-  end subroutine check_names
-
-  !> Have a shell send a signal while this program does not wait for a shell, which would make it
-  !! deaf to SIGINT.
-  subroutine send(name, process)
-    character(*), intent(in) :: name, process
-
-    call execute_command_line('(sleep 0.2; kill -s '//name//' '//process//') &')
-    call parallel_pause(0.6_wp)
-  end subroutine send
-
-  !> An integer in words.
-  function text_of(n) result(text)
-    integer, intent(in) :: n
-    character(:), allocatable :: text
-    character(12) :: buffer
-
-    write (buffer, '(i0)') n
-    text = trim(buffer)
-  end function text_of
 
 end module test_timers_signals_m

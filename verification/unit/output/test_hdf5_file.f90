@@ -2,8 +2,6 @@
 ! ranks: 2 3
 module test_hdf5_file_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use, intrinsic :: iso_c_binding, only: c_funptr, c_int, c_long, c_null_char
-  use c_library_m, only: c_getrlimit, c_rename, c_signal
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root, nproc, my_rank, global_max
   use hdf5_file_m, only: h5_file_t
@@ -15,27 +13,15 @@ module test_hdf5_file_m
 
   character(*), parameter :: path = 'test_hdf5_file.h5'
 
-  interface
-    integer(c_int) function c_setrlimit(resource, limit) bind(c, name='setrlimit')
-      import :: c_int, c_long
-      implicit none
-      integer(c_int), value :: resource
-      integer(c_long), intent(in) :: limit(2)
-    end function c_setrlimit
-  end interface
-
 contains
 
   subroutine test_hdf5_file()
     call test_attributes()
     call test_datasets()
     call test_columns()
-    call test_read_while_open()
     call test_shared_blocks()
     call test_go_on_together()
     call test_room()
-    call test_no_room()
-    call test_another_in_its_place()
     call test_trouble()
     call remove(path)
   end subroutine test_hdf5_file
@@ -186,31 +172,6 @@ contains
     call table%file%close()
   end subroutine test_columns
 
-  !> What was flushed can be read while the writer holds the file: no locks.
-  subroutine test_read_while_open()
-    type(table_t) :: writer
-    type(h5_file_t) :: reader
-    real(wp) :: x(1)
-
-    if (.not. is_root()) return
-    call remove(path)
-    call writer%file%create(path, .false.)
-    call writer%begin(creating)
-    call writer%column('/time', 's', 0.0_wp)
-    call writer%begin(appending)
-    call writer%column('/time', 's', 42.0_wp)
-    call writer%file%flush()
-    call execute_command_line('cp '//path//' copy_' &
-      //path)   ! what a reader, or a crash, finds on disk
-    call reader%open('copy_'//path, .false., .false.)
-    call reader%read('/time', x)
-    call check('a flushed row is on disk', x(1), 42.0_wp, 0.0_wp)
-    call reader%close()
-    call writer%file%close()
-    call check('no error while reading', reader%info + writer%file%info, 0)
-    call remove('copy_'//path)
-  end subroutine test_read_while_open
-
   !> All processes write their layers of one dataset; what is read does not depend on their number.
   subroutine test_shared_blocks()
     type(table_t) :: table
@@ -330,95 +291,6 @@ contains
     call check('rows that take more room than they asked for', too_large, 0)
     call check('some rows take much room', grew)
   end subroutine test_room
-
-  !> Without room nothing is written but the last word, and the file stays whole.
-  subroutine test_no_room()
-    type(h5_file_t) :: file
-    real(wp) :: x(2)
-    integer(i8) :: before, after
-    integer :: n
-
-    if (.not. is_root()) return
-    call remove(path)
-    call file%create(path, .false.)
-    call file%attribute('/', 'exit_status', -1)
-    call file%store('/time', 's', [1.0_wp, 2.0_wp])
-    call file%flush()
-    inquire (file=path, size=before)
-    call limit_files(before + 100)
-    call file%reserve(1000_i8)
-    call limit_files(-1_i8)
-    call check('no room is an error', file%info /= 0)
-    call check('and named', index(file%message, path//': cannot write: ') == 1)
-    inquire (file=path, size=after)
-    call check('the file is as long as before', after == before)
-    call file%store('/more', 's', [3.0_wp])
-    call file%last_integer('/', 'exit_status', 4)
-    call file%close()
-    call file%open(path, .false., .false.)
-    call file%read('/time', x)
-    call file%read_attribute('/', 'exit_status', n)
-    call file%close()
-    call check_file('the file stays whole', file)
-    call check('the last word is in it', n, 4)
-  end subroutine test_no_room
-
-  !> Let no file become longer; -1: as long as the system likes.
-  subroutine limit_files(bytes)
-    integer(i8), intent(in) :: bytes
-    integer(c_int), parameter :: file_size = 1, too_large = 25   ! RLIMIT_FSIZE, SIGXFSZ
-    type(c_funptr) :: before
-    integer(c_long) :: limit(2)
-
-    before = c_signal(too_large, transfer(1_i8, before))   ! ignored: the call fails instead
-    if (c_getrlimit(file_size, limit) /= 0) error stop 'getrlimit'
-    limit(1) = merge(limit(2), int(bytes, c_long), bytes < 0)
-    if (c_setrlimit(file_size, limit) /= 0) error stop 'setrlimit'
-  end subroutine limit_files
-
-  !> A file that is there is not overwritten; what is done to a file that has been moved is not done
-  !! to the one in its place.
-  subroutine test_another_in_its_place()
-    type(h5_file_t) :: file, other
-    character(*), parameter :: kept = 'test_hdf5_kept.h5'
-    integer(i8) :: before, after
-    integer :: i
-
-    if (.not. is_root()) return
-    call remove(path)
-    call file%create(path, .false.)
-    call file%store('/a', 'm', [1.0_wp])
-    call file%flush()
-    if (c_rename(path//c_null_char, kept//c_null_char) /= 0) error stop 'rename'
-    call other%create(path, .false.)
-    call other%store('/b', 'm', [(1.0_wp*i, i=1, 5000)])
-    call other%close()
-    inquire (file=path, size=before)
-    call file%reserve(10000_i8*100)
-    call file%store('/c', 'm', [2.0_wp])
-    call file%close()
-    inquire (file=path, size=after)
-    call check('the other file keeps its length', after == before)
-    call file%create(path, .false.)
-    call check('a file that is there is not overwritten', file%info /= 0)
-    call file%close()
-    call file%open(kept, .false., .false.)
-    call check('the moved file has what was written', file%has('/c'))
-    call file%close()
-    call remove(path)
-    call file%create(path, .false.)
-    if (c_rename(kept//c_null_char, path//c_null_char) /= 0) error stop 'rename'
-    inquire (file=path, size=before)
-    call limit_files(before + 100)
-    call file%reserve(before + 1000)
-    call limit_files(-1_i8)
-    call check('a file that could not be begun', file%info /= 0)
-    call file%close()
-    call file%open(path, .false., .false.)
-    call check('is not deleted by the name of another', file%has('/a'))
-    call file%close()
-    call check_file('files are held, not named', file)
-  end subroutine test_another_in_its_place
 
   subroutine test_trouble()
     type(h5_file_t) :: file

@@ -3,7 +3,6 @@
 module test_restart_m
   use kinds_m, only: wp, i8
   use parallel_m, only: is_root, nproc, broadcast
-  use hdf5_file_m, only: h5_file_t
   use restart_m, only: write_restart, read_restart
   use state_m, only: list_state
   use state_list_m, only: state_list_t
@@ -23,9 +22,7 @@ contains
     call test_comes_back(.false.)
     call test_comes_back(.true.)
     call test_dry()
-    call test_case_must_stay()
     call test_damage()
-    call test_trouble()
     if (is_root()) call remove(path)
   end subroutine test_restart
 
@@ -125,37 +122,6 @@ contains
     call check('blocks come back', other%blocks%v(3, 2), s%blocks%v(3, 2), 0.0_wp)
   end subroutine test_dry
 
-  !> t_end and the intervals may change, nothing else may.
-  subroutine test_case_must_stay()
-    type(sample_t) :: s
-    integer :: info
-    character(:), allocatable :: message
-
-    call make_sample(0.5_wp, .false., s)
-    call write_sample(s, info, message)
-    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01' &
-      //new_line('a') &
-      //'  field_interval = 2'//new_line('a')//'/'//new_line('a')
-    s%clock%t_end = 9.0_wp
-    s%clock%rows%interval = 0.5_wp
-    call read_sample(s, info, message)
-    call check('t_end and intervals may change', info, 0)
-    call check('the next row is due after the restart', s%clock%rows%next, 1.5_wp, 1.0e-14_wp)
-    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.02' &
-      //new_line('a') &
-      //'/'//new_line('a')
-    call read_sample(s, info, message)
-    call check('another dt is refused', info, 2)
-    call check('the message says what changed', index(message, 'dt = 0.02, was dt = 0.01') > 0)
-    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01'//new_line('a')
-    call read_sample(s, info, message)
-    call check('a missing line is refused', info, 2)
-    call make_sample(0.5_wp, .false., s)
-    s%clock%t_end = 1.0_wp
-    call read_sample(s, info, message)
-    call check('an end before the restart is refused', info, 2)
-  end subroutine test_case_must_stay
-
   !> Overwrite one byte after the other, all through the file: what is read is either whole or
   !! refused.
   subroutine test_damage()
@@ -210,30 +176,5 @@ contains
     call broadcast(n)
     call broadcast(n)
   end subroutine meet
-
-  subroutine test_trouble()
-    type(sample_t) :: s
-    type(h5_file_t) :: file
-    integer :: info
-    character(:), allocatable :: message
-
-    call make_sample(0.5_wp, .false., s)
-    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, &
-                       s%run_state_t, info, message)
-    call check('a missing folder is an error', info, 1)
-    call read_restart('no-such-file.h5', s%parameters, s%run_state_t, &
-                      info, message)
-    call check('a missing file is an error', info, 1)
-    call check('the message names it', index(message, 'no-such-file.h5') > 0)
-    if (is_root()) then
-      call remove(path)
-      call file%create(path, .false.)
-      call file%attribute('/', 'format', 'mics-run')
-      call file%close()
-    end if
-    call meet()
-    call read_sample(s, info, message)
-    call check('a file of another kind is an error', info, 1)
-  end subroutine test_trouble
 
 end module test_restart_m
