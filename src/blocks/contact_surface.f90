@@ -25,8 +25,8 @@ module contact_surface_m
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
-  use meeting_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes
-  use near_features_m, only: near_features_t, search_t, list_features, list_bed, edge_in_view
+  use near_features_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes, &
+    near_features_t, search_t, list_features, list_bed, edge_in_view
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
   private

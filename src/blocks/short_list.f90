@@ -5,9 +5,8 @@ module short_list_m
   use growing_m, only: ensure_capacity
   use surface_search_m, only: surface_t, nearest_on_surface, nowhere
   use edge_crossing_m, only: edge_t
-  use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
-  use near_features_m, only: near_features_t, near_vertices_t, search_t, append_facets, &
-    append_edges, edge_in_view, way_to_crossing
+  use near_features_m, only: poses_t, view_t, meeting_t, seen_from, way_between, near_features_t, &
+    near_vertices_t, search_t, append_facets, append_edges, edge_in_view, way_to_crossing
   implicit none
   private
   public :: short_list_t, short_list_holds, choose_features, n_chosen

@@ -11,7 +11,7 @@ module two_cubes_m
   use surface_search_m, only: surface_t
   use bed_m, only: bed_counterpart
   use counterparts_m, only: counterparts_t
-  use meeting_m, only: poses_t, meeting_t, update_views
+  use near_features_m, only: poses_t, meeting_t, update_views
   implicit none
   private
   public :: make_solid, random_poses, moved, meeting_at, distance_from_cube, vector

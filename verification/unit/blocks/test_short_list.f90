@@ -4,8 +4,8 @@ module test_short_list_m
   use check_m, only: check
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: crossing_t, cross_edges
-  use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
-  use near_features_m, only: near_features_t, search_t, list_features, edge_in_view
+  use near_features_m, only: poses_t, view_t, meeting_t, seen_from, way_between, near_features_t, &
+    search_t, list_features, edge_in_view
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   use two_cubes_m, only: make_solid, random_poses, moved, meeting_at, distance_from_cube
   implicit none
