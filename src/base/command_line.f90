@@ -208,12 +208,18 @@ contains
     type(options_t), intent(in) :: options     !! of the run that stopped
     character(*), intent(in) :: restart_file
     character(:), allocatable :: command
+    character(16) :: time
+    integer :: s
 
     command = ''
     if (processes > 1) command = 'mpirun -n '//to_text(processes)//' '
     command = command//shell_word(program)//' --restart '//shell_word(restart_file)
     if (options%threads > 0) command = command//' --threads '//to_text(options%threads)
-    if (options%max_wall > 0.0_wp) command = command//' --max-wall '//time_text(options%max_wall)
+    if (options%max_wall > 0.0_wp) then
+      s = nint(options%max_wall)
+      write (time, '(i0, 2(":", i2.2))') s/3600, modulo(s/60, 60), modulo(s, 60)
+      command = command//' --max-wall '//time(:len_trim(time) - merge(3, 0, modulo(s, 60) == 0))
+    end if
     if (options%quiet) command = command//' --quiet'
     if (len(options%case_file) > 0) then
       command = command//' '//shell_word(options%case_file)
@@ -221,19 +227,6 @@ contains
       command = command//' < CASE   (CASE: the case file, which came on standard input)'
     end if
   end function restart_command
-
-  !> A time as the option takes it, HH:MM or HH:MM:SS.
-  pure function time_text(seconds) result(text)
-    real(wp), intent(in) :: seconds   !! whole seconds
-    character(:), allocatable :: text
-    character(16) :: buffer
-    integer :: s
-
-    s = nint(seconds)
-    write (buffer, '(i0, 2(":", i2.2))') s/3600, modulo(s/60, 60), modulo(s, 60)
-    text = trim(buffer)
-    if (modulo(s, 60) == 0) text = text(:len(text) - 3)
-  end function time_text
 
   !> A word between quotes where a shell would take it apart.
   pure function shell_word(word) result(text)

@@ -16,7 +16,6 @@ submodule (parallel_m) parallel_mpi_m
   use decomposition_m, only: best_pieces, last_cell, min_cells
   use exact_accumulator_m, only: accumulator_size, merge_accumulators
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
-  use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
   implicit none
 
   integer :: n_processes = 1, rank = 0
@@ -119,8 +118,8 @@ contains
   end function rank_beside
 
   module procedure fill_wp
-    real(wp), pointer, contiguous :: box(:)
-    integer :: e, s, n, bytes, from(4), to(4)
+    real(wp), pointer, contiguous :: box(:, :, :, :)
+    integer :: e, s, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
@@ -129,28 +128,27 @@ contains
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call box_of_layers(extent, width, layers, e, from, to)
-      n = product(to - from + 1)
-      bytes = n*storage_size(box)/8
+      bytes = product(to - from + 1)*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
-        call pack_wp(a, extent, from, to, box)
+        call c_f_pointer(outgoing(s), box, to - from + 1)
+        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
-        call unpack_wp(box, extent, from, to, a)
+        call c_f_pointer(incoming(s), box, to - from + 1)
+        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
     end do
   end procedure fill_wp
 
   module procedure fill_sp
-    real(sp), pointer, contiguous :: box(:)
-    integer :: e, s, n, bytes, from(4), to(4)
+    real(sp), pointer, contiguous :: box(:, :, :, :)
+    integer :: e, s, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
@@ -159,28 +157,27 @@ contains
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call box_of_layers(extent, width, layers, e, from, to)
-      n = product(to - from + 1)
-      bytes = n*storage_size(box)/8
+      bytes = product(to - from + 1)*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
-        call pack_sp(a, extent, from, to, box)
+        call c_f_pointer(outgoing(s), box, to - from + 1)
+        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
-        call unpack_sp(box, extent, from, to, a)
+        call c_f_pointer(incoming(s), box, to - from + 1)
+        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
     end do
   end procedure fill_sp
 
   module procedure fill_integer
-    integer, pointer, contiguous :: box(:)
-    integer :: e, s, n, bytes, from(4), to(4)
+    integer, pointer, contiguous :: box(:, :, :, :)
+    integer :: e, s, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
@@ -189,21 +186,20 @@ contains
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call box_of_layers(extent, width, layers, e, from, to)
-      n = product(to - from + 1)
-      bytes = n*storage_size(box)/8
+      bytes = product(to - from + 1)*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
-        call pack_integer(a, extent, from, to, box)
+        call c_f_pointer(outgoing(s), box, to - from + 1)
+        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
-        call unpack_integer(box, extent, from, to, a)
+        call c_f_pointer(incoming(s), box, to - from + 1)
+        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
     end do
   end procedure fill_integer

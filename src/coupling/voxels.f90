@@ -54,26 +54,16 @@ contains
     do d = 1, 3
       low = grid%cell_of(x(d) - radius, d) - 1
       high = grid%cell_of(x(d) + radius, d) + 1
-      call images(self, grid, d, low, high, self%first(d, b), self%last(d, b))
+      if (grid%periodic(d)) then   ! numbers of periods by which they may be shifted
+        self%first(d, b) = -floor_ratio(high - self%low(d), grid%n(d))
+        self%last(d, b) = floor_ratio(self%high(d) - low, grid%n(d))
+      else
+        self%first(d, b) = 0
+        self%last(d, b) = merge(0, -1, high >= self%low(d) .and. low <= self%high(d))
+      end if
     end do
     self%near(b) = all(self%first(:, b) <= self%last(:, b))
   end subroutine find_images
-
-  !> Numbers of periods by which cells low..high may be shifted to touch the cells kept here.
-  pure subroutine images(self, grid, d, low, high, first, last)
-    type(voxels_t), intent(in) :: self
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: d, low, high
-    integer, intent(out) :: first, last
-
-    if (grid%periodic(d)) then
-      first = -floor_ratio(high - self%low(d), grid%n(d))
-      last = floor_ratio(self%high(d) - low, grid%n(d))
-    else
-      first = 0
-      last = merge(0, -1, high >= self%low(d) .and. low <= self%high(d))
-    end if
-  end subroutine images
 
   !> Largest whole number not above a/b, b > 0.
   elemental integer function floor_ratio(a, b)

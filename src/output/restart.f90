@@ -49,7 +49,7 @@ contains
     character(:), allocatable, intent(out) :: message
     type(h5_file_t) :: file
     type(state_list_t) :: list
-    integer :: i
+    integer :: i, d, first(3), last(3)
 
     call list_state(state, list)
     call file%create(path, .true.)
@@ -66,7 +66,21 @@ contains
       call file%group(trim(state_groups(i)))
     end do
     do i = 1, list%n
-      call write_item(list%grid, list%item(i), file)
+      associate (item => list%item(i))
+        select case (item%kind)
+        case (item_cells)   ! each process its part
+          call file%new_blocks(item%name, item%units, item%extent)
+          do d = 1, item%extent(4)
+            call item%part(list%grid, d, first, last)
+            call file%write_block(item%name, [first, d], [last - first + 1, 1], &
+              [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
+          end do
+        case (item_reals)
+          call file%store(item%name, item%units, item%reals, item%extent)
+        case default
+          call file%store(item%name, '1', item%numbers(), item%extent)
+        end select
+      end associate
     end do
     call file%attribute('/', 'checksum', list%checksum())
     call file%close(stored=.true.)
@@ -262,28 +276,6 @@ contains
       line = ''
     end do
   end subroutine next_line
-
-  !> Write an item of the state; of cells each process its part.
-  subroutine write_item(grid, item, file)
-    type(grid_t), intent(in) :: grid
-    type(item_t), intent(in) :: item
-    type(h5_file_t), intent(inout) :: file
-    integer :: first(3), last(3), d
-
-    select case (item%kind)
-    case (item_cells)
-      call file%new_blocks(item%name, item%units, item%extent)
-      do d = 1, item%extent(4)
-        call item%part(grid, d, first, last)
-        call file%write_block(item%name, [first, d], [last - first + 1, 1], &
-          [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
-      end do
-    case (item_reals)
-      call file%store(item%name, item%units, item%reals, item%extent)
-    case default
-      call file%store(item%name, '1', item%numbers(), item%extent)
-    end select
-  end subroutine write_item
 
   !> Read an item of the state. Faces on the upper side of a periodic domain are those on its lower
   !! side: the exchange fills them.

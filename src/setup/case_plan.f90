@@ -57,7 +57,9 @@ contains
     call count_contact_features(case, shapes, n_points, d_s)
     call print_run(unit, case)
     call print_grid(unit, case, wet)
-    if (bed%there) call print_bed(unit, case, bed)
+    if (bed%there) call entry(unit, 'bed from', file_text(trim(case%bed%file))//', ' &
+      //to_text(bed%n_given)//' facets, heights from '//place_text(minval(bed%point(3, :)), &
+      case%grid%length)//' to '//place_text(maxval(bed%point(3, :)), case%grid%length)//' m')
     if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
     if (with_blocks) call print_shapes(unit, case, shapes, n_points)
     if (with_blocks) call print_bodies(unit, case, blocks, bed)
@@ -114,20 +116,6 @@ contains
       text = place_text(case%grid%origin(d), case%grid%length)
     end function place
   end subroutine print_grid
-
-  subroutine print_bed(unit, case, bed)
-    integer, intent(in) :: unit
-    type(case_t), intent(in) :: case
-    type(bed_t), intent(in) :: bed
-    real(wp) :: low(3), high(3)
-
-    low = minval(bed%point, 2)
-    high = maxval(bed%point, 2)
-    call entry(unit, 'bed from', file_text(trim(case%bed%file))//', ' &
-               //to_text(bed%n_given)//' facets, ' &
-               //'heights from '//place_text(low(3), case%grid%length)//' to ' &
-               //place_text(high(3), case%grid%length)//' m')
-  end subroutine print_bed
 
   subroutine print_liquid(unit, case, bed)
     integer, intent(in) :: unit
@@ -286,34 +274,31 @@ contains
     end do
     if (n_moved > 0) call entry(unit, 'moved by a table', to_text(n_moved)//', up to ' &
       //brief(fastest(1))//' m/s and '//brief(fastest(2))//' rad/s')
-    if (keeps_its_water(case, bed)) call print_rise(unit, case, blocks)
+    call print_rise(unit, case, blocks, bed)
   end subroutine print_bodies
 
-  !> Does the level rise by the volume of what comes in, over the area of the tank? Not where water
-  !! can leave through a side, nor where a bed reaches out of it.
-  pure function keeps_its_water(case, bed) result(yes)
-    type(case_t), intent(in) :: case
-    type(bed_t), intent(in) :: bed
-    logical :: yes
-
-    yes = case%run%physics == 'light'
-    if (has_flow(case%run)) yes = len_trim(case%fluid%initial_state) == 0 &
-      .and. .not. case%fluid%single_phase .and. is_given(case%fluid%water_level)
-    if (yes) yes = .not. any(gives_pressure(side_code(case%boundary%kind(:, 1:2))) &
-      .or. case%boundary%kind(:, 1:2) == 'inflow') &
-      .and. .not. gives_pressure(side_code(case%boundary%kind(1, 3)))
-    if (yes .and. bed%there) yes = maxval(bed%point(3, :)) <= case%fluid%water_level
-  end function keeps_its_water
-
-  !> The level when all that comes later is under water.
-  subroutine print_rise(unit, case, blocks)
+  !> The level when all that comes later is under water: it rises by the volume of that over the
+  !! area of the tank, but not where water can leave through a side, nor where a bed reaches out of
+  !! it.
+  subroutine print_rise(unit, case, blocks, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     character(:), allocatable :: text
     real(wp) :: rise   ! [m]
+    logical :: keeps
     integer :: b
 
+    keeps = case%run%physics == 'light'
+    if (has_flow(case%run)) keeps = len_trim(case%fluid%initial_state) == 0 &
+      .and. .not. case%fluid%single_phase .and. is_given(case%fluid%water_level)
+    if (any(gives_pressure(side_code(case%boundary%kind(:, 1:2))) &
+        .or. case%boundary%kind(:, 1:2) == 'inflow') &
+        .or. gives_pressure(side_code(case%boundary%kind(1, 3))) .or. .not. keeps) return
+    if (bed%there) then
+      if (maxval(bed%point(3, :)) > case%fluid%water_level) return
+    end if
     rise = 0.0_wp
     do b = 1, blocks%n
       if (b > size(case%body) .or. blocks%release_time(b) > 0.0_wp) rise = rise &
