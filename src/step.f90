@@ -43,6 +43,7 @@ module step_m
   use rigid_body_m, only: follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use block_record_m, only: update_record
+  use ground_m, only: stands
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_deep, store_points, warn_of_overlaps
   use release_m, only: release_due_blocks, let_go_lowered, take_out, next_release, nothing_to_come
@@ -204,9 +205,7 @@ contains
     type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(inout) :: report
     type(fluid_sums_t) :: fluid
-    real(wp), allocatable :: force(:, :)
-    logical :: released, begins(sim%blocks%n)
-    integer :: b
+    logical :: released
 
     call follow_motions(sim%clock%t, sim%blocks)
     call take_out(sim%grid, sim%case%fluid%gravity, sim%clock%t, sim%blocks)
@@ -222,21 +221,38 @@ contains
       fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
       call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
     end if
-    begins = sim%blocks%present .and. .not. sim%initialised
-    if (.not. any(begins)) return
-    ! one that has just appeared gets the force of a fluid at rest when it is let go; after each
-    ! step the fluid force of that step takes over
-    allocate (force(6, size(sim%coupling%total, 2)))
-    call copy_motion(sim%blocks, sim%coupling%bodies)
-    call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
-      sim%clock%dt), begins, force)
-    do b = 1, sim%blocks%n
-      if (.not. begins(b)) cycle
-      sim%blocks%fluid_force(:, b) = force(1:3, b)
-      sim%blocks%fluid_torque(:, b) = force(4:6, b)
-      sim%initialised(b) = .true.
-    end do
+    if (any(sim%blocks%present .and. .not. sim%initialised)) call first_forces(sim)
   end subroutine release
+
+  !> A block that has just appeared gets the force of a fluid at rest in which it is let go; one
+  !! that stands on something gets its buoyancy, and contact bears the rest. Later the forces are
+  !! those of the step before.
+  subroutine first_forces(sim)
+    type(simulation_t), intent(inout), target :: sim
+    real(wp) :: force(6, size(sim%coupling%total, 2))
+    logical :: begins(sim%blocks%n), stand(sim%blocks%n)
+    integer :: b
+
+    associate (blocks => sim%blocks, bodies => sim%coupling%bodies)
+      call copy_motion(blocks, bodies)
+      begins = blocks%present .and. .not. sim%initialised
+      do b = 1, blocks%n
+        stand(b) = begins(b) .and. bodies%free(b) .and. all(abs(bodies%motion(:, b)) <= 0.0_wp)
+        if (stand(b)) stand(b) = stands(sim%walls, blocks, b, sim%overlap)
+      end do
+      call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
+        sim%clock%dt), begins .and. .not. stand, force)
+      do b = 1, blocks%n
+        if (.not. begins(b)) cycle
+        blocks%fluid_force(:, b) = force(1:3, b)
+        blocks%fluid_torque(:, b) = force(4:6, b)
+        sim%initialised(b) = .true.
+        if (.not. stand(b)) cycle
+        blocks%contact_force(:, b) = -(force(1:3, b) + blocks%mass(b)*sim%case%fluid%gravity)
+        blocks%contact_torque(:, b) = -force(4:6, b)
+      end do
+    end associate
+  end subroutine first_forces
 
   !> What acts before the transport, and what the later stages need of the start of the step.
   subroutine begin(sim, dt_before, n_clipped)

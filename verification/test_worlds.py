@@ -5,12 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from worlds import similarity, symmetry
+from worlds import balance, similarity, symmetry
 from worlds.__main__ import LAWS, judge
 
 FAILED = tomllib.loads((Path(__file__).parent / "worlds" / "failed.toml").read_text())
 SEEDS = {
     "still": 30,
+    "lying": 8,
     "balance": 12,
     "restart": 4,
     "machine": 2,
@@ -51,6 +52,12 @@ def test_a_spinning_block_has_its_mirror_image(tmp_path: Path) -> None:
     world = symmetry.spinning()
     symmetry.same(world, tmp_path / "x", symmetry.MIRROR_X, limit=1e-7)
     symmetry.same(world, tmp_path / "y", symmetry.MIRROR_Y, limit=1e-7)
+
+
+def test_honey_comes_to_rest(tmp_path: Path) -> None:
+    """Its energy grew by 1e5 in longer steps than the stress of the surface allows."""
+    energy = balance.motion(balance.honey(), tmp_path)
+    assert energy[-1] < energy[1]
 
 
 def test_every_law_is_tested() -> None:

@@ -16,7 +16,7 @@ module ground_m
   use overlap_solid_m, only: solid_t
   implicit none
   private
-  public :: way_down, height_on_top, ground_gap, nothing_below
+  public :: way_down, height_on_top, stands, ground_gap, nothing_below
 
   real(wp), parameter :: ground_gap = 1.0e-5_wp
     !! left below a block that is set down, over its smallest edge [-]
@@ -66,6 +66,19 @@ contains
       height = -nothing_below
     end if
   end function height_on_top
+
+  !> Does block c stand on something, no further in it than a hundredth of its edge?
+  function stands(walls, blocks, c, overlap) result(yes)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: c
+    type(overlap_t), intent(in) :: overlap
+    logical :: yes
+
+    associate (edge => blocks%shapes(blocks%shape(c))%smallest_edge)
+      yes = min_gap(walls, blocks, c, overlap, -0.01_wp*edge) <= gap_of(blocks, c)
+    end associate
+  end function stands
 
   !> The gap that is left below a block [m].
   pure real(wp) function gap_of(blocks, c)

@@ -418,7 +418,7 @@ contains
     class(monolithic_t), intent(inout) :: self   !! its bodies in place
     type(stage_t), intent(in) :: s               !! of its flow only the pressure changes
     logical, intent(in) :: begins(:)             !! (blocks) those let go; all others are held
-    real(wp), intent(out) :: force(:, :)         !! (6, bodies), of those let go [N, N m]
+    real(wp), intent(out) :: force(:, :)         !! (6, bodies), buoyancy of the others [N, N m]
     real(wp), parameter :: weightless(3) = 0.0_wp
     real(wp), allocatable :: uf(:, :, :, :), solid_flux(:, :, :, :)
     type(stage_t) :: release
@@ -438,7 +438,7 @@ contains
       do b = 1, bodies%n
         bodies%free(b) = .false.
         if (b <= size(begins)) bodies%free(b) = moving%free(b) .and. begins(b)
-        force(1:3, b) = force(1:3, b) + bodies%mass(b)*self%fluid%gravity
+        if (bodies%free(b)) force(1:3, b) = force(1:3, b) + bodies%mass(b)*self%fluid%gravity
       end do
       self%at_start = bodies
       call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
@@ -449,6 +449,7 @@ contains
       flow%uf = 0.0_wp
       call solve_pressure(release, flow%rho, bodies, self%pressure)
       do b = 1, bodies%n
+        if (.not. bodies%free(b)) cycle
         a = bodies%motion(:, b)/dt
         force(1:3, b) = bodies%mass(b)*(a(1:3) - self%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))

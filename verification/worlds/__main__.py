@@ -27,6 +27,7 @@ from worlds.world import Broken, World
 Law = tuple[SearchStrategy[World], Callable[[World, Path], None]]
 LAWS: dict[str, Law] = {
     "still": (draw.still(), balance.stays_still),
+    "lying": (draw.lying(), balance.lies_still),
     "balance": (draw.world(), balance.balance),
     "froude": (draw.world(), similarity.froude),
     "units": (draw.world(), similarity.units),

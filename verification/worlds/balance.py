@@ -4,20 +4,44 @@ from pathlib import Path
 
 import numpy as np
 
+from micstools.shapes.geometry import Array
 from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
 STILL = 1e-9  # kinetic energy of the fluid over rho g h^4 with the size h of a cell
+LOADING = 1e-4  # the same while contacts take their load; 4e-4 to 3e-2 if they begin to fall
 
 
 def stays_still(world: World, folder: Path) -> None:
     """Water at rest around held blocks stays at rest."""
+    below("kinetic energy of the fluid over rho g h^4", motion(world, folder), STILL)
+
+
+def lies_still(world: World, folder: Path) -> None:
+    """Around free ones that lie on the floor and on each other it moves as their contacts load."""
+    below("kinetic energy of the fluid over rho g h^4", motion(world, folder), LOADING)
+
+
+def honey() -> World:
+    """Level honey that hardly moves, under a gas nearly as dense."""
+    return World(
+        [
+            ("run", {"t_end": 0.15, "dt": 7.8e-3, "field_interval": 0.0, "restart_interval": 0.0}),
+            ("grid", {"cells": [2, 16, 11], "length": [7.19e-3, 0.0432012, 0.0320265]}),
+            ("boundary", {"x_min": "slip", "x_max": "slip", "y_min": "periodic",
+                          "y_max": "periodic"}),
+            ("fluid", {"liquid_density": 700.0, "gas_density": 583.0, "liquid_viscosity": 10.0,
+                       "water_level": 0.02287795, "velocity": [0.0, 1e-6, 1e-6]}),
+        ]
+    )  # fmt: skip
+
+
+def motion(world: World, folder: Path) -> Array:
+    """Kinetic energy of the fluid in each row over rho g h^4 [-]."""
     run = world.run(folder, ends=(0,))
     h = run.grid.spacing.prod() ** (1 / 3)
     scale = world.value("fluid", "liquid_density") * np.linalg.norm(run.gravity) * h**4
-    worst = float(run.series.kinetic_energy_fluid.max() / scale)
-    if not worst < STILL:
-        raise Broken(f"kinetic energy of the fluid is {worst:.2g} rho g h^4, not below {STILL:g}")
+    return run.series.kinetic_energy_fluid / scale
 
 
 def balance(world: World, folder: Path) -> None:

@@ -88,6 +88,12 @@ def fluid(draw: Draw, across: float) -> Group:
     return found
 
 
+def step(share: float, liquid: Group, cell: list[float]) -> float:
+    """A share of the step of the shortest waves, below that of a very viscous surface [s]."""
+    drive = sum(1 / c**2 for c in cell) * liquid["liquid_viscosity"] / liquid["liquid_density"]
+    return min(share * sqrt(min(cell) / GRAVITY), 1.9 / drive)
+
+
 @st.composite
 def numerics(draw: Draw) -> Group:
     """Any of the methods."""
@@ -138,12 +144,13 @@ def still(draw: Draw) -> World:
     wanted = [*room(across, ends, 1.15, [n, 1]), level + across]
     cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
     length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
-    dt = draw(number(0.1, 0.8)) * sqrt(min(cell) / GRAVITY)
+    liquid = draw(fluid(across))
+    dt = step(draw(number(0.1, 0.8)), liquid, cell)
     groups: list[tuple[str, Group]] = [
         ("run", {"t_end": 120 * dt, "dt": dt, "field_interval": 0.0, "restart_interval": 0.0}),
         ("grid", {"cells": cells, "length": length}),
         ("boundary", ends),
-        ("fluid", {**draw(fluid(across)), "water_level": level}),
+        ("fluid", {**liquid, "water_level": level}),
         ("numerics", draw(numerics())),
     ]
     for b in range(n):
@@ -156,6 +163,42 @@ def still(draw: Draw) -> World:
             ("body", {"shape": f"s{b}", "fixed": True, "position": rounded(place),
                       "quaternion": draw(attitude())}),
         ]  # fmt: skip
+    return World(groups)
+
+
+@st.composite
+def lying(draw: Draw) -> World:
+    """Water at rest over one or two free stacks of boxes."""
+    across = draw(power(0.01, 5.0))  # of a box [m]
+    cell = [across / draw(st.integers(4, 8)) * draw(number(1.0, a)) for a in (1.4, 0.7, 1.3)]
+    n, floors = draw(st.integers(1, 2)), draw(st.integers(1, 3))
+    level = across * draw(number(0.5, 2.5))
+    ends = draw(sides(("no_slip", "slip")))
+    wanted = [*room(across, ends, 1.6, [n, 1]), max(level, across * floors) + 0.5 * across]
+    cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
+    length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
+    liquid = draw(fluid(across))
+    dt = step(draw(number(0.05, 0.4)), liquid, cell)
+    groups: list[tuple[str, Group]] = [
+        ("run", {"t_end": 20 * dt, "dt": dt, "field_interval": 0.0, "restart_interval": 0.0}),
+        ("grid", {"cells": cells, "length": length}),
+        ("boundary", ends),
+        ("fluid", {**liquid, "water_level": level}),
+        ("numerics", draw(numerics())),
+        ("contact", {**draw(contact(across)), "solver": "impulses"}),  # springs have to sink
+    ]
+    for b in range(n):
+        place, top = rounded([(b + 0.5) * length[0] / n, length[1] / 2]), 0.0
+        for f in range(floors):
+            name, width = f"s{b}{f}", across * (1.0 - 0.2 * f)
+            size = rounded([width, 0.8 * width, across * draw(number(0.9, 0.3))])
+            middle, top = top + size[2] / 2, top + size[2]
+            groups += [
+                ("shape", {"name": name, "kind": "box", "size": size, "refinement": 1,
+                           "density": draw(power(3100.0, 5000.0))}),
+                ("body", {"shape": name, "position": [*place, middle],
+                          "axis": [0.0, 0.0, 1.0], "angle_deg": draw(around(90.0))}),
+            ]  # fmt: skip
     return World(groups)
 
 
@@ -213,7 +256,8 @@ def world(
     wanted = [*room(across, ends, 1.2, places[:2]), 1.2 * across * (places[2] + 1)]
     cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
     length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
-    dt = draw(number(0.05, 0.4)) * sqrt(min(cell) / GRAVITY)
+    liquid = draw(fluid(across))
+    dt = step(draw(number(0.05, 0.4)), liquid, cell)
     steps = draw(st.integers(4, 24))
     run = {"physics": physics, "t_end": steps * dt, "dt": dt, "field_interval": 0.0,
            "restart_interval": 0.0, "rest_speed": 1e-3 * sqrt(GRAVITY * across)}  # fmt: skip
@@ -221,7 +265,7 @@ def world(
         ("run", run),
         ("grid", {"cells": cells, "length": length}),
         ("boundary", ends),
-        ("fluid", draw(fluid(across))),
+        ("fluid", liquid),
         ("numerics", draw(numerics())),
         ("contact", draw(contact(across))),
     ]
