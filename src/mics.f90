@@ -6,7 +6,7 @@ program mics
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
-  use errors_m, only: problems_t, fatal, to_text, exit_ok, exit_input, exit_files
+  use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use stack_limit_m, only: check_stack
   use signals_m, only: catch_signals

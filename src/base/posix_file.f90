@@ -11,7 +11,7 @@ module posix_file_m
   implicit none
   private
   public :: posix_file_t, is_pipe, is_file_at, system_reason
-  public :: lock_taken, lock_refused, lock_unknown
+  public :: lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
   integer, parameter :: lock_unknown = 2   !! the file system keeps no locks

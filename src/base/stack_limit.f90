@@ -4,13 +4,13 @@
 !! program without a word, so this is asked first.
 module stack_limit_m
   use, intrinsic :: iso_c_binding, only: c_int, c_long
-  use kinds_m, only: wp, i8
+  use kinds_m, only: i8
   use c_library_m, only: c_getrlimit
   use errors_m, only: problems_t, to_text
   use value_text_m, only: lower_case, quoted_text, parse_integer, value_ok
   implicit none
   private
-  public :: check_stack, stack_bytes
+  public :: check_stack
 
   integer(i8), parameter :: kilobyte = 1024_i8
   integer(i8), parameter :: min_stack = 64*kilobyte    !! of the process or a thread [B]

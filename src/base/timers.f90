@@ -6,7 +6,7 @@ module timers_m
   use kinds_m, only: wp, i8, name_length
   implicit none
   private
-  public :: timer, tic, toc, wall_clock, phase_t, phases
+  public :: timer, tic, toc, wall_clock, phases
 
   integer, parameter :: max_timers = 64
 

@@ -9,7 +9,7 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: place_t, handling_t, max_drop_shapes, max_variants
+  public :: place_t, handling_t, max_variants
   public :: absent, is_given, size_count, smallest_spacing, has_flow, contact_of, not_resolved
   public :: member_name
   public :: start_t, begun_t

@@ -18,7 +18,7 @@ module namelist_text_m
   implicit none
   private
   public :: cut_groups
-  public :: namelist_text_t, group_text_t, assignment_t, value_t
+  public :: namelist_text_t, group_text_t
 
   !> One value as it stands in the text, without its quotes.
   type :: value_t

@@ -14,7 +14,7 @@ module placing_table_m
   use value_text_m, only: quoted_text, nearest_name, lower_case, parse_logical, sanitise, value_ok
   implicit none
   private
-  public :: read_places, attitude_of_angles
+  public :: read_places
 
   integer, parameter :: max_rows = 100000
   integer, parameter :: max_reported = 100   !! problems of one table

@@ -10,7 +10,7 @@ module coupling_m
   use scratch_m, only: take, give
   use stage_m, only: stage_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
-  use case_types_m, only: case_t, numerics_t, fluid_t
+  use case_types_m, only: case_t, fluid_t
   use fields_m, only: add_product
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
@@ -23,7 +23,7 @@ module coupling_m
   implicit none
   private
   public :: coupling_t, coupling_report_t, coupling_init, copy_motion, push_bodies, move_by_forces
-  public :: by_old_pressure, by_displaced, by_half_kick, left_by_walls, by_viscosity
+  public :: by_old_pressure, by_displaced, by_half_kick, by_viscosity
   public :: by_new_pressure, by_walls
   public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
   public :: find_surface_force, start_of_stages, motion_after_fluid

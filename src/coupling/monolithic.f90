@@ -11,7 +11,7 @@ module monolithic_m
   use grid_m, only: grid_t, n_halo
   use scratch_m, only: take, give
   use stage_m, only: stage_t
-  use fields_m, only: flow_t, add_product
+  use fields_m, only: add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, velocity_in_cell

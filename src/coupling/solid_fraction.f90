@@ -109,6 +109,7 @@ contains
     call find_shares(grid, blocks, self)
     call ensure_lists(self%body, self%voxels, solid)
     call place_bodies(grid, self%body, self%voxels, solid)
+    ! what the sections write of `solid` is disjoint: faces, cells, links
     !$omp parallel sections
     !$omp section
     call voxelise_faces(grid, self%body, self%voxels, solid)

@@ -9,7 +9,7 @@ module diagnostics_m
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_body_m, only: blocks_t, kinetic_energy, potential_energy
+  use rigid_body_m, only: kinetic_energy, potential_energy
   use run_state_m, only: run_state_t
   implicit none
   private

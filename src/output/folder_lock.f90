@@ -17,7 +17,7 @@ module folder_lock_m
     c_unlinkat, text_of_letters
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_pause
-  use posix_file_m, only: posix_file_t, system_reason, lock_taken, lock_refused, lock_unknown
+  use posix_file_m, only: posix_file_t, system_reason, lock_refused, lock_unknown
   implicit none
   private
   public :: folder_lock_t, lock_name, stop_name, look_at_folder

@@ -1,7 +1,7 @@
 !> Starting HDF5 the way this program needs it, and the reason of its last failure in plain words.
 module hdf5_reason_m
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_null_char, c_funptr, &
-    c_funloc, c_loc, c_f_pointer, c_null_ptr, c_associated
+    c_funloc, c_loc, c_f_pointer, c_associated
   use c_library_m, only: c_setenv, text_at
   use hdf5, only: h5open_f, h5eset_auto_f, h5dont_atexit_f
   implicit none

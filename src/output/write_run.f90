@@ -5,7 +5,7 @@
 module write_run_m
   use kinds_m, only: wp
   use parallel_m, only: is_root, nproc, get_threads
-  use timers_m, only: phases, phase_t
+  use timers_m, only: phases
   use build_info_m, only: version, git_revision, compiler, flags
   use rigid_body_m, only: blocks_t, own_mass
   use bed_m, only: bed_t
