@@ -61,9 +61,11 @@ contains
       call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
                //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
     end if
-    if (report%energy_excess > excess_max) call set(sim, 'fluid and blocks have ' &
-      //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was set' &
-      //' free: &run dt or cfl_max is too long for this flow', fault)
+    if (sim%energy%known) then   ! else the excess is NaN
+      if (report%energy_excess > excess_max) call set(sim, 'fluid and blocks have ' &
+        //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was ' &
+        //'set free: &run dt or cfl_max is too long for this flow', fault)
+    end if
     overlap = overlap_fault(sim%deep)
     if (len(overlap) > 0) call set(sim, overlap, fault)
     call look_at_blocks(sim, fault)
