@@ -27,7 +27,7 @@ contains
     call count_points(4)
     error(1) = worst_share()
     call count_points(7)
-    call count_points(16)
+    call recount(16)
     error(2) = worst_share()
     print '(a, 2f8.4)', 'largest error of a share with 4 and 16 sub-cells', error
     call check('4 sub-cells: largest error of a share', error(1) > 0.01_wp .and. error(1) < 0.1_wp)
