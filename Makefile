@@ -83,13 +83,19 @@ help:
 # `make V=1` shows whole commands.
 say = $(if $(V),,@echo '  $(1)';)
 
-$(binary): $$(OBJECTS_mics)
+# NO_LTO=1 links as the objects are; the other way of linking links anew.
+link := $(flags) $(if $(NO_LTO),-fno-lto)
+$(B)/link: FORCE
+	$(call keep,$(link))
+$(binary): $$(OBJECTS_mics) $(B)/link
 	$(if $(OBJECTS_mics),,$(error src/mics.f90, the main program, is missing))
-	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
+	$(call say,LD $@)$(compiler) $(link) -o $@ $(filter %.o,$^)
 
 units: $(unit_programs) $(if $(MPI)$(DEBUG),,$(driver_programs))
 
-# Every variant that `make test` runs, side by side but for the two that share objects.
+# Every variant that `make test` runs, side by side but for the two that share objects. Only the
+# first is optimised as a whole when it is linked, which takes longer than to compile it;
+# verification/test_bits.py compares the bits of both.
 variants := serial-variant mpi-variant debug-variant
 .PHONY: $(variants)
 everything: $(variants)
@@ -97,7 +103,7 @@ mpi-variant: serial-variant
 serial-variant:
 	@$(MAKE) --no-print-directory all units
 mpi-variant:
-	@$(MAKE) --no-print-directory MPI=1 all units
+	@$(MAKE) --no-print-directory MPI=1 NO_LTO=1 all units
 debug-variant:
 	@$(MAKE) --no-print-directory DEBUG=1 all units
 
