@@ -9,7 +9,7 @@ from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
 STILL = 1e-9  # kinetic energy of the fluid over rho g h^4 with the size h of a cell
-LOADING = 1e-4  # the same while contacts take their load; 4e-4 to 3e-2 if they begin to fall
+LOADING = 1e-5  # the same while contacts take their load; 4e-4 to 3e-2 if they begin to fall
 
 
 def stays_still(world: World, folder: Path) -> None:

@@ -185,7 +185,15 @@ def lying(draw: Draw) -> World:
         ("boundary", ends),
         ("fluid", {**liquid, "water_level": level}),
         ("numerics", draw(numerics())),
-        ("contact", {**draw(contact(across)), "solver": "impulses"}),  # springs have to sink
+        # springs have to sink; how far impulses let them sink goes with the square of this time
+        (
+            "contact",
+            {
+                **draw(contact(across)),
+                "solver": "impulses",
+                "contact_time": 3e-3 * sqrt(across / GRAVITY),
+            },
+        ),
     ]
     for b in range(n):
         place, top = rounded([(b + 0.5) * length[0] / n, length[1] / 2]), 0.0
