@@ -42,12 +42,12 @@ module impulse_rows_m
     real(wp), allocatable :: closing(:)           !! (n) normal velocity at the start [m/s]
     real(wp), allocatable :: largest(:)           !! (n) largest normal impulse of the step [N s]
     real(wp), allocatable :: total(:, :)          !! (3, n) impulse of the whole step [N s]
-    integer, allocatable :: hit(:)                !! rows of impacts
-    real(wp), allocatable :: returned(:, :)       !! (3, hits) their impulses [N s]
+    real(wp), allocatable :: base(:, :)           !! (3, n) remembered, of a sub-sweep [N s]
+    real(wp), allocatable :: gained(:, :)         !! (3, n) by impacts [N s]
+    real(wp), allocatable :: returned(:, :)       !! (3, n) by restitution [N s]
     integer :: n_pairs = 0
     integer, allocatable :: a(:), b(:), first(:)  !! (n_pairs), (n_pairs + 1) rows of each
     integer, allocatable :: colour(:)             !! (n_pairs)
-    real(wp), allocatable :: push(:, :)           !! (3, n_pairs) on b, of a sub-sweep [N s]
     real(wp), allocatable :: turn(:, :)           !! (3, n_pairs) twist of both by their way [N m s]
     integer :: n_colours = 0
     integer, allocatable :: order(:)              !! (n_pairs) pairs, colour by colour
@@ -55,22 +55,35 @@ module impulse_rows_m
     integer(i8), allocatable :: used(:)           !! (n) work: colours of each body
     integer :: n_active = 0
     integer, allocatable :: active(:)             !! bodies that move and have rows
-    logical, allocatable :: busy(:), struck(:)    !! (counterparts) has rows; was hit
+    logical, allocatable :: busy(:)               !! (counterparts) has rows
+    integer, allocatable :: changed(:)
+      !! (counterparts) sweep in which an impact changed it last, or never
     real(wp), allocatable :: v(:, :)
       !! (6, counterparts) velocity and spin [m/s], [rad/s]
-    real(wp), allocatable :: v_start(:, :)        !! (6, counterparts) at the start of the step
     real(wp), allocatable :: way(:, :)
       !! (6, counterparts) since the step began [m], [rad]
     real(wp), allocatable :: a_free(:, :)
       !! (6, counterparts) without contact [m/s2], [rad/s2]
+    real(wp), allocatable :: v_start(:, :)        !! (6, counterparts) when the step began
     real(wp), allocatable :: by_contact(:, :)     !! (6, counterparts) change of v in a sub-sweep
+    !> Work where masses differ much: impulses and velocities before a sweep, directions.
+    logical :: hard = .false.
+    real(wp) :: h = 0.0_wp, push_max = 0.0_wp     !! sub-sweep, largest speed of opening [s], [m/s]
+    integer :: number = 0                         !! of the sweeps over an impact, 0: over all pairs
+    real(wp) :: small = 0.0_wp                    !! change of a velocity that ends them [m/s]
+    logical, allocatable :: reached(:)            !! (n_pairs)
+    real(wp) :: square = 0.0_wp                   !! of the last change of the impulses
+    real(wp), allocatable :: kept(:, :), along(:, :)       !! (3, n) [N s]
     real(wp), allocatable :: inverse_mass(:)      !! (counterparts) 0: does not yield [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, counterparts) [1/(kg m2)]
   end type rows_t
 
   real(wp), parameter :: damping_ratio = 5.0_wp
     !! of the soft contact points: they do not swing [-]
+  real(wp), parameter :: sinking = 0.01_wp
+    !! overlap by the force remembered, at most, over the length of the contact point [-]
   real(wp), parameter :: min_weight = 0.02_wp     !! of a contact point that counts [-]
+  real(wp), parameter :: max_ratio = 10.0_wp      !! of masses that a few sweeps hold [-]
   integer, parameter :: max_colours = 64          !! pairs of the last one are solved one by one
 
 contains
@@ -86,15 +99,17 @@ contains
       rows%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
     allocate (rows%used(n), source=0_i8)
     allocate (rows%active(n + 1 - bed_counterpart), source=0)
-    allocate (rows%busy(bed_counterpart:n), rows%struck(bed_counterpart:n), source=.false.)
+    allocate (rows%busy(bed_counterpart:n), source=.false.)
+    allocate (rows%changed(bed_counterpart:n), source=0)
     allocate (rows%begin(max_colours + 1), source=1)
   end subroutine rows_init
 
   !> Rows of all contact points of a contact step, with the impulses and stretches remembered.
   !!
-  !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, damped so
-  !! much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D
-  !! (2024).
+  !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, and at
+  !! least as stiff as holds the force F of the last step at a small overlap d, w^2 = F/(m_n d);
+  !! damped so much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto,
+  !! Solver2D (2024).
   subroutine make_rows(h, contact_time, detected, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
     real(wp), intent(in) :: contact_time          !! [s]
@@ -109,6 +124,7 @@ contains
     call reserve_rows(detected%points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
+    rows%hard = .false.
     m = 1
     do t = 1, detected%points%n
       associate (point => detected%points%item(t), law => detected%law)
@@ -117,18 +133,24 @@ contains
         rows%n = r
         rows%point(r) = t
         call begin_pair(point%a, point%b, rows)
-        w = 2*pi*sqrt(point%weight)/contact_time
-        a1 = 2*damping_ratio + h*w
-        a2 = h*w*a1
         rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
-          gap=-point%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
-          friction=merge(law%wall_friction, law%friction, point%b < 0))
+          gap=-point%depth, friction=merge(law%wall_friction, law%friction, point%b < 0))
         call weigh(point%a, point%b, rows, rows%row(r))
-        rows%closing(r) = dot_product(past(rows%v(:, point%a), rows%v(:, point%b), rows%row(r)), &
-                                      point%normal)
+        call recall(point, h, memory, m, rows%row(r))
+        associate (row => rows%row(r))
+          w = sqrt(max(point%weight*(2*pi/contact_time)**2, &
+            row%impulse(1)/(h*row%mass*sinking*point%length)))
+          a1 = 2*damping_ratio + h*w
+          a2 = h*w*a1
+          row%rate = w/a1
+          row%soft = a2/(1.0_wp + a2)
+          row%keep = 1.0_wp/(1.0_wp + a2)
+        end associate
+        rows%closing(r) = dot_product(past(rows%v(:, point%a), rows%v(:, point%b), &
+          point%arm_a, point%arm_b), point%normal)
         rows%largest(r) = 0.0_wp
         rows%total(:, r) = 0.0_wp
-        call recall(point, h, memory, m, rows%row(r))
+        rows%base(:, r) = rows%row(r)%impulse
       end associate
     end do
     rows%first(rows%n_pairs + 1) = rows%n + 1
@@ -180,14 +202,17 @@ contains
     call ensure_capacity(n, rows%closing)
     call ensure_capacity(n, rows%largest)
     call ensure_capacity(n, rows%total)
-    call ensure_capacity(n, rows%hit)
+    call ensure_capacity(n, rows%base)
+    call ensure_capacity(n, rows%gained)
     call ensure_capacity(n, rows%returned)
+    call ensure_capacity(n, rows%kept)
+    call ensure_capacity(n, rows%along)
     call ensure_capacity(n, rows%a)
     call ensure_capacity(n, rows%b)
     call ensure_capacity(n + 1, rows%first)
     call ensure_capacity(n, rows%colour)
     call ensure_capacity(n, rows%order)
-    call ensure_capacity(n, rows%push)
+    call ensure_capacity(n, rows%reached)
     call ensure_capacity(n, rows%turn)
   end subroutine reserve_rows
 
@@ -195,6 +220,7 @@ contains
   pure subroutine begin_pair(a, b, rows)
     integer, intent(in) :: a, b
     type(rows_t), intent(inout) :: rows
+    real(wp) :: ratio
 
     if (rows%n_pairs > 0) then
       if (rows%a(rows%n_pairs) == a .and. rows%b(rows%n_pairs) == b) return
@@ -203,9 +229,11 @@ contains
     rows%a(rows%n_pairs) = a
     rows%b(rows%n_pairs) = b
     rows%first(rows%n_pairs) = rows%n
-    rows%push(:, rows%n_pairs) = 0.0_wp
     rows%turn(:, rows%n_pairs) = 0.0_wp
     rows%busy([a, b]) = .true.
+    if (min(rows%inverse_mass(a), rows%inverse_mass(b)) <= 0.0_wp) return
+    ratio = rows%inverse_mass(a)/rows%inverse_mass(b)
+    rows%hard = rows%hard .or. max(ratio, 1.0_wp/ratio) > max_ratio
   end subroutine begin_pair
 
   !> Tangents of a row and the masses that two counterparts set against an impulse at it,
@@ -259,17 +287,14 @@ contains
   end subroutine add_response
 
   !> Velocity or way of the contact on b past that on a.
-  pure function past(a, b, row) result(v)
+  pure function past(a, b, arm_a, arm_b) result(v)
     real(wp), intent(in) :: a(6), b(6)
-    type(row_t), intent(in) :: row
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres [m]
     real(wp) :: v(3)
 
-    v(1) = (b(1) - a(1)) + b(5)*row%arm_b(3) - b(6)*row%arm_b(2) - a(5)*row%arm_a(3) &
-      + a(6)*row%arm_a(2)
-    v(2) = (b(2) - a(2)) + b(6)*row%arm_b(1) - b(4)*row%arm_b(3) - a(6)*row%arm_a(1) &
-      + a(4)*row%arm_a(3)
-    v(3) = (b(3) - a(3)) + b(4)*row%arm_b(2) - b(5)*row%arm_b(1) - a(4)*row%arm_a(2) &
-      + a(5)*row%arm_a(1)
+    v(1) = (b(1) - a(1)) + b(5)*arm_b(3) - b(6)*arm_b(2) - a(5)*arm_a(3) + a(6)*arm_a(2)
+    v(2) = (b(2) - a(2)) + b(6)*arm_b(1) - b(4)*arm_b(3) - a(6)*arm_a(1) + a(4)*arm_a(3)
+    v(3) = (b(3) - a(3)) + b(4)*arm_b(2) - b(5)*arm_b(1) - a(4)*arm_a(2) + a(5)*arm_a(1)
   end function past
 
   !> An impulse along the normal and the tangents of a row in space axes.
@@ -401,7 +426,7 @@ contains
           memory%id(m) = point%id
           memory%other(m) = point%other
           memory%k(m) = 0.0_wp
-          way = past(rows%way(:, point%a), rows%way(:, point%b), row)
+          way = past(rows%way(:, point%a), rows%way(:, point%b), row%arm_a, row%arm_b)
           memory%xi(:, m) = 0.0_wp
           if (norm(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &

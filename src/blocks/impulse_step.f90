@@ -16,7 +16,7 @@ module impulse_step_m
   use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
   use substep_limits_m, only: equal_substep
   use impulse_rows_m, only: rows_t, rows_init, make_rows, store_memory, sum_loads
-  use impulse_sweeps_m, only: solve_rows, restore
+  use impulse_sweeps_m, only: solve_rows
   use lubrication_m, only: lubricate
   use contact_detection_m, only: list_bodies
   use resting_m, only: hold_or_wake, restore_contacts
@@ -27,7 +27,7 @@ module impulse_step_m
   integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
   integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
   real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
-  real(wp), parameter :: margin = 5.0e-3_wp       !! of a contact point to come, over that edge [-]
+  real(wp), parameter :: margin = 0.02_wp        !! of a contact point to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
   real(wp), parameter :: free_way = 0.5_wp
     !! covered by the list of pairs, over a bounding radius [-]
@@ -90,7 +90,7 @@ contains
       n = ceiling(step*real(n_sub_sweeps, wp)/contacts%contact_time*(1.0_wp - 1.0e-9_wp))
       h = step/real(n, wp)
       do
-        call solve_step(walls, gravity, step, h, n, contacts, blocks)
+        call solve_step(walls, gravity, h, n, step, contacts, blocks)
         if (.not. contacts%sleep%active) exit
         call hold_or_wake(gravity, contacts, blocks, woke)
         if (.not. woke) exit
@@ -185,11 +185,13 @@ contains
   end subroutine longest_step
 
   !> Find the contact points of a contact step and their impulses; the bodies stay where they are.
-  subroutine solve_step(walls, gravity, step, h, n, contacts, blocks)
+  !! The step may become shorter.
+  subroutine solve_step(walls, gravity, h, n, step, contacts, blocks)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in) :: step, h      !! of n sub-sweeps [s]
-    integer, intent(in) :: n
+    real(wp), intent(in) :: h            !! sub-sweep [s]
+    integer, intent(inout) :: n          !! of them
+    real(wp), intent(inout) :: step      !! all of them [s]
     type(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp) :: by_film(3)
@@ -208,8 +210,7 @@ contains
         contacts%lubrication, contacts%film)
       call make_rows(h, contacts%contact_time, detected, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
-        ! Accelerations of all bodies with rows but for contact, at the start of the step. An impact
-        ! in the step returns the speed that the films leave.
+        ! Accelerations of all bodies with rows but for contact, at the start of the step.
         do k = 1, rows%n_active
           associate (b => rows%active(k))
             rows%a_free(:, b) = 0.0_wp
@@ -218,14 +219,14 @@ contains
             end if
             if (rows%inverse_mass(b) <= 0.0_wp) cycle
             by_film = rows%inverse_mass(b)*contacts%film(:, b)
-            rows%v_start(1:3, b) = rows%v_start(1:3, b) + step*by_film
             rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
             rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), &
               blocks%fluid_torque(:, b) - cross(blocks%omega(:, b), blocks%l(:, b)))
           end associate
         end do
-        call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
-        call restore(contacts%restitution, slow_hit*norm(gravity)*step, rows)
+        call solve_rows(h, max_opening*contacts%smallest_edge/contacts%contact_time, &
+          contacts%restitution, slow_hit*norm(gravity)*step, n, rows)
+        step = h*real(n, wp)
       end if
       call sum_loads(step, rows, loads%force, loads%torque)
       loads%force = loads%force + contacts%film

@@ -10,58 +10,72 @@
 !!
 !! gamma_n >= 0, and friction within mu gamma_n after it, with the tangential way as its memory.
 !! Source: Macklin et al. (2019), Small steps in physics simulation; Catto (2024), Solver2D.
+!!
+!! Where a row was hit, sweeps over the impulses of the whole step go on through the chain of bodies
+!! that this reaches until nothing closes, v = v_c. Then each row gives back e times what its
+!! impulse gained beyond the load before, gamma_b, normal and tangential alike (Poisson):
+!!
+!! $$ \gamma = \gamma_c + e (\gamma_c - \gamma_b), \qquad v = v_c + e (v_c - v_b). $$
+!!
+!! This makes no energy: the work is (1 + e) (gamma_c - gamma_b).v_c - (1 - e^2)/2 M u.u, u = v_c -
+!! v_b, and (gamma_c - gamma_b).v_c <= 0, as what pushes does not open and friction opposes slip.
+!!
+!! Where masses differ much, sweeps are directions of conjugate gradients: Silcowitz-Hansen et al.
+!! (2010), A nonsmooth nonlinear conjugate gradient method.
 module impulse_sweeps_m
   use kinds_m, only: wp
-  use vectors_m, only: cross
-  use bed_m, only: bed_counterpart
+  use vectors_m, only: cross, norm
   use impulse_rows_m, only: row_t, rows_t, past, in_space
   implicit none
   private
-  public :: solve_rows, restore
+  public :: solve_rows
 
   integer, parameter :: n_correct = 2           !! sweeps with bias; one lets the stack creep
-  integer, parameter :: n_restore = 6           !! sweeps over impacts
+  integer, parameter :: n_finish = 200           !! sweeps over an impact, at most
+  integer, parameter :: n_open = 6              !! sweeps after what it returned
+  integer, parameter :: n_hard = 400            !! sweeps where masses differ much, at most
+  real(wp), parameter :: max_turn = 0.02_wp     !! by contact in the rest of a step, times e [rad]
+  integer, parameter :: never = -2              !! no sweep over an impact changed it
   integer, parameter :: worth_threads = 512     !! fewer rows are the work of one thread
   real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
+  real(wp), parameter :: small = 0.01_wp         !! change that ends an impact, over slow hits [-]
+  real(wp), parameter :: residual = 1.0e-7_wp   !! the same over the fastest or first change
 
 contains
 
-  !> Impulses, velocities and ways of a contact step of n sub-sweeps.
+  !> Impulses, velocities and ways of a contact step of n sub-sweeps, or of fewer: the step ends
+  !! where contact has changed a spin so much that the bodies would turn far in the rest of it.
   !!
   !! Where nothing changes any more, and all is in balance, the rest of the step goes on as it is.
-  subroutine solve_rows(h, n, push_max, rows)
+  subroutine solve_rows(h, push_max, e, slowest, n, rows)
     real(wp), intent(in) :: h          !! sub-sweep [s]
-    integer, intent(in) :: n           !! sub-sweeps
     real(wp), intent(in) :: push_max   !! largest speed with which overlaps open [m/s]
+    real(wp), intent(in) :: e          !! restitution [-]
+    real(wp), intent(in) :: slowest    !! closing speed of what counts as a hit [m/s]
+    integer, intent(inout) :: n        !! sub-sweeps
     type(rows_t), intent(inout) :: rows
-    real(wp) :: change, largest
-    integer :: s, i, k, left, r
+    logical :: backward
+    real(wp) :: change, largest, spin
+    integer :: s, k, left, r
 
+    rows%h = h
+    rows%push_max = push_max
+    rows%number = 0
     call apply_remembered(rows)
     do s = 1, n
       call begin_sweep(h, rows)
-      change = 0.0_wp
-      do i = 1, n_correct
-        call sweep(h, push_max, .true., mod(s + i, 2) == 0, rows, largest)
-        change = max(change, largest)
-      end do
-      do k = 1, rows%n_active
-        associate (b => rows%active(k))
-          rows%way(:, b) = rows%way(:, b) + h*rows%v(:, b)
-        end associate
-      end do
-      ! Let the rows follow the bodies.
-      do k = 1, rows%n_pairs
-        do r = rows%first(k), rows%first(k + 1) - 1
-          rows%row(r)%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), rows%row(r))
-        end do
-      end do
-      call sweep(h, push_max, .false., mod(s, 2) == 0, rows, largest)
+      backward = mod(s, 2) /= 0
+      call settle(.true., n_correct, backward, rows, change)
+      call move(h, rows)
+      backward = mod(s, 2) == 0
+      call settle(.false., 1, backward, rows, largest)
       change = max(change, largest)
+      spin = 0.0_wp
       do k = 1, rows%n_active
         associate (b => rows%active(k))
           rows%by_contact(:, b) = rows%v(:, b) - rows%by_contact(:, b)
+          spin = max(spin, norm(rows%v(4:6, b) - rows%v_start(4:6, b)))
         end associate
       end do
       left = 1
@@ -76,52 +90,66 @@ contains
         call go_on(h, left - 1, rows)
         exit
       end if
+      if (e*spin*h*real(n - s, wp) > max_turn) n = s
+      if (s >= n) exit
     end do
+    call end_impacts(n, e, slowest, backward, rows)
   end subroutine solve_rows
 
   !> Change of the velocities by the impulses remembered.
   pure subroutine apply_remembered(rows)
     type(rows_t), intent(inout) :: rows
-    real(wp) :: p(3)
     integer :: k, r
 
     do k = 1, rows%n_pairs
-      associate (a => rows%a(k), b => rows%b(k))
-        do r = rows%first(k), rows%first(k + 1) - 1
-          associate (row => rows%row(r))
-            p = in_space(row%impulse, row)
-            rows%push(:, k) = rows%push(:, k) + p
-            call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
-                           rows%by_contact(:, a))
-            call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
-                           rows%by_contact(:, b))
-          end associate
-        end do
-      end associate
+      do r = rows%first(k), rows%first(k + 1) - 1
+        associate (row => rows%row(r), a => rows%a(k), b => rows%b(k), p => in_space( &
+          rows%row(r)%impulse, rows%row(r)))
+          rows%by_contact(:, a) = rows%by_contact(:, a) - by_impulse(a, row%arm_a, p, rows)
+          rows%by_contact(:, b) = rows%by_contact(:, b) + by_impulse(b, row%arm_b, p, rows)
+        end associate
+      end do
     end do
   end subroutine apply_remembered
 
   !> Change of the velocity and spin of a body by an impulse at an arm.
-  pure subroutine add_impulse(inverse_mass, inverse_inertia, arm, p, v)
-    real(wp), intent(in) :: inverse_mass, inverse_inertia(3, 3)   !! [1/kg], [1/(kg m2)]
-    real(wp), intent(in) :: arm(3), p(3)                          !! [m], [N s]
-    real(wp), intent(inout) :: v(6)                               !! [m/s], [rad/s]
+  pure function by_impulse(b, arm, p, rows) result(dv)
+    integer, intent(in) :: b
+    real(wp), intent(in) :: arm(3), p(3)   !! [m], [N s]
+    type(rows_t), intent(in) :: rows
+    real(wp) :: dv(6)                      !! [m/s], [rad/s]
     real(wp) :: twist(3)
 
-    if (inverse_mass <= 0.0_wp) return
+    dv = 0.0_wp
+    if (rows%inverse_mass(b) <= 0.0_wp) return
     twist = cross(arm, p)
-    v(1:3) = v(1:3) + inverse_mass*p
-    v(4:6) = v(4:6) + (inverse_inertia(:, 1)*twist(1) + inverse_inertia(:, 2)*twist(2) &
-                       + inverse_inertia(:, 3)*twist(3))
-  end subroutine add_impulse
+    dv(1:3) = rows%inverse_mass(b)*p
+    dv(4:6) = rows%inverse_inertia(:, 1, b)*twist(1) + rows%inverse_inertia(:, 2, b)*twist(2) &
+      + rows%inverse_inertia(:, 3, b)*twist(3)
+  end function by_impulse
+
+  !> Change of the velocities of pair k by an impulse on b at its row r, also booked as twist.
+  pure subroutine push(p, k, r, rows)
+    real(wp), intent(in) :: p(3)   !! [N s]
+    integer, intent(in) :: k, r
+    type(rows_t), intent(inout) :: rows
+    real(wp) :: half(3)
+
+    half = half_way_past(k, rows)
+    associate (row => rows%row(r), a => rows%a(k), b => rows%b(k))
+      rows%v(:, a) = rows%v(:, a) - by_impulse(a, row%arm_a - half, p, rows)
+      rows%v(:, b) = rows%v(:, b) + by_impulse(b, row%arm_b + half, p, rows)
+    end associate
+    rows%turn(:, k) = rows%turn(:, k) + cross(half, p)
+  end subroutine push
 
   !> Begin a sub-sweep: free fall and the impulses of the one before. What `by_contact` holds until
   !! the sub-sweep ends are the velocities without contact.
   pure subroutine begin_sweep(h, rows)
     real(wp), intent(in) :: h   !! [s]
     type(rows_t), intent(inout) :: rows
-    real(wp) :: free(6)
-    integer :: k
+    real(wp) :: free(6), p(3)
+    integer :: k, r
 
     do k = 1, rows%n_active
       associate (b => rows%active(k))
@@ -131,9 +159,33 @@ contains
       end associate
     end do
     do k = 1, rows%n_pairs
-      rows%turn(:, k) = rows%turn(:, k) + cross(half_way_past(k, rows), rows%push(:, k))
+      p = 0.0_wp
+      do r = rows%first(k), rows%first(k + 1) - 1
+        p = p + in_space(rows%row(r)%impulse, rows%row(r))
+      end do
+      rows%turn(:, k) = rows%turn(:, k) + cross(half_way_past(k, rows), p)
     end do
   end subroutine begin_sweep
+
+  !> Move the bodies and let the rows follow.
+  pure subroutine move(h, rows)
+    real(wp), intent(in) :: h   !! [s]
+    type(rows_t), intent(inout) :: rows
+    integer :: k, r
+
+    do k = 1, rows%n_active
+      associate (b => rows%active(k))
+        rows%way(:, b) = rows%way(:, b) + h*rows%v(:, b)
+      end associate
+    end do
+    do k = 1, rows%n_pairs
+      do r = rows%first(k), rows%first(k + 1) - 1
+        associate (row => rows%row(r))
+          row%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), row%arm_a, row%arm_b)
+        end associate
+      end do
+    end do
+  end subroutine move
 
   !> Half of the way of a past b: the contact stays between them, and the arm of b is longer, that
   !! of a shorter by this. Zero where one does not yield [m].
@@ -149,11 +201,40 @@ contains
     end associate
   end function half_way_past
 
+  !> So many sweeps; where masses differ much as many as they need.
+  subroutine settle(bias, n, backward, rows, change)
+    logical, intent(in) :: bias           !! see `correct`
+    integer, intent(in) :: n              !! sweeps
+    logical, intent(inout) :: backward    !! whether the next sweep is
+    type(rows_t), intent(inout) :: rows
+    real(wp), intent(out) :: change       !! largest of a velocity [m/s]
+    real(wp) :: first, last
+    integer :: i, most
+
+    change = 0.0_wp
+    first = 0.0_wp
+    if (rows%hard .or. rows%number > 0) call begin_directions(rows)
+    most = merge(n_hard, n, rows%hard)
+    do i = 1, most
+      call sweep(bias, backward, rows, last)
+      backward = .not. backward
+      change = max(change, last)
+      if (rows%number > 0) then
+        if (last < rows%small) exit
+        rows%number = rows%number + 1
+      else if (rows%hard .and. i >= n) then
+        if (i == n) first = last
+        if (last <= max(residual*first, settled*rows%h)) exit
+      end if
+      if (i < most .and. mod(i, 2) == 0 .and. (rows%hard .or. rows%number > 0)) then
+        call accelerate(rows)
+      end if
+    end do
+  end subroutine settle
+
   !> One sweep over all pairs, colour by colour, or backwards.
-  subroutine sweep(h, push_max, bias, backward, rows, change)
-    real(wp), intent(in) :: h, push_max   !! [s], [m/s]
-    logical, intent(in) :: bias           !! overlaps open; else their velocity is taken away
-    logical, intent(in) :: backward
+  subroutine sweep(bias, backward, rows, change)
+    logical, intent(in) :: bias, backward
     type(rows_t), intent(inout) :: rows
     real(wp), intent(out) :: change       !! largest, of a velocity [m/s]
     real(wp) :: most
@@ -167,7 +248,7 @@ contains
       c = merge(last + 1 - i, i, backward)
       !$omp do schedule(static)
       do m = rows%begin(c), rows%begin(c + 1) - 1
-        call solve_pair(h, push_max, bias, backward, rows%order(m), rows, most)
+        call solve_pair(bias, backward, rows%order(m), rows, most)
       end do
       !$omp end do
     end do
@@ -177,46 +258,55 @@ contains
     !$omp end parallel
   end subroutine sweep
 
-  !> Correct the impulses of the rows of one pair, one after the other.
-  subroutine solve_pair(h, push_max, bias, backward, k, rows, change)
-    real(wp), intent(in) :: h, push_max
+  !> Correct the impulses of the rows of one pair, one after the other; in sweeps over an impact
+  !! only if a body changed just now.
+  subroutine solve_pair(bias, backward, k, rows, change)
     logical, intent(in) :: bias, backward
     integer, intent(in) :: k
     type(rows_t), intent(inout) :: rows
     real(wp), intent(inout) :: change
-    real(wp) :: va(6), vb(6), p(3), total(3), mass
+    real(wp) :: va(6), vb(6), p(3), total(3), half(3), arm_a(3), arm_b(3), mass, most, h
     integer :: r, from, to, way
 
     associate (a => rows%a(k), b => rows%b(k))
+      if (.not. is_live(k, rows)) return
+      rows%reached(k) = .true.
       from = merge(rows%first(k + 1) - 1, rows%first(k), backward)
       to = merge(rows%first(k), rows%first(k + 1) - 1, backward)
       way = merge(-1, 1, backward)
       va = rows%v(:, a)
       vb = rows%v(:, b)
       mass = rows%inverse_mass(a) + rows%inverse_mass(b)
+      half = half_way_past(k, rows)
       total = 0.0_wp
+      most = 0.0_wp
       do r = from, to, way
         associate (row => rows%row(r))
-          call correct(h, push_max, bias, past(va, vb, row), row, p)
+          arm_a = row%arm_a - half
+          arm_b = row%arm_b + half
+          h = rows%h   ! what pushed in an impact counts as closed
+          if (rows%number > 0 .and. row%impulse(1) > 0.0_wp) h = huge(h)
+          call correct(h, rows%push_max, bias, past(va, vb, arm_a, arm_b), row, p)
           rows%largest(r) = max(rows%largest(r), row%impulse(1))
           if (.not. any(abs(p) > 0.0_wp)) cycle
-          call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, va)
-          call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, vb)
+          va = va - by_impulse(a, arm_a, p, rows)
+          vb = vb + by_impulse(b, arm_b, p, rows)
         end associate
         total = total + p
-        change = max(change, (abs(p(1)) + abs(p(2)) + abs(p(3)))*mass)
+        most = max(most, (abs(p(1)) + abs(p(2)) + abs(p(3)))*mass)
       end do
       if (rows%inverse_mass(a) > 0.0_wp) rows%v(:, a) = va
       if (rows%inverse_mass(b) > 0.0_wp) rows%v(:, b) = vb
-      rows%push(:, k) = rows%push(:, k) + total
-      rows%turn(:, k) = rows%turn(:, k) + cross(half_way_past(k, rows), total)
+      rows%turn(:, k) = rows%turn(:, k) + cross(half, total)
+      change = max(change, most)
+      if (rows%number > 0 .and. most >= rows%small) call mark(rows%number, k, rows)
     end associate
   end subroutine solve_pair
 
   !> Correct the impulse of one row: along the normal, then friction with the velocity after that.
   pure subroutine correct(h, push_max, bias, v, row, p)
     real(wp), intent(in) :: h, push_max   !! [s], [m/s]
-    logical, intent(in) :: bias
+    logical, intent(in) :: bias           !! overlaps open; else their velocity is taken away
     real(wp), intent(in) :: v(3)          !! of b past a [m/s]
     type(row_t), intent(inout) :: row
     real(wp), intent(out) :: p(3)         !! change of the impulse on b [N s]
@@ -296,142 +386,174 @@ contains
     integer, intent(in) :: times
     type(rows_t), intent(inout) :: rows
     integer :: s, k
-    real(wp) :: free(6)
 
     do s = 1, times
-      do k = 1, rows%n_pairs
-        rows%turn(:, k) = rows%turn(:, k) + cross(half_way_past(k, rows), rows%push(:, k))
-      end do
+      call begin_sweep(h, rows)
       do k = 1, rows%n_active
         associate (b => rows%active(k))
-          free = rows%v(:, b) + h*rows%a_free(:, b)
-          rows%v(:, b) = free + rows%by_contact(:, b)
+          rows%by_contact(:, b) = rows%v(:, b) - rows%by_contact(:, b)
           rows%way(:, b) = rows%way(:, b) + h*rows%v(:, b)
         end associate
       end do
     end do
   end subroutine go_on
 
-  !> Restitution after Newton: where a body was hit faster than `slowest`, all its contact points
-  !! leave with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of
-  !! the whole step would pull. So no energy is made: that of impulses P is the sum of
-  !! P (v_n + v_n(start))/2. The arms are those of where the bodies are now.
-  pure subroutine restore(e, slowest, rows)
-    real(wp), intent(in) :: e         !! [-]
-    real(wp), intent(in) :: slowest   !! [m/s]
-    type(rows_t), intent(inout) :: rows
-    real(wp) :: p(3)
-    integer :: i, k, m, r, hits
+  !> Whether a pair is to be solved: all, or over an impact those with a body that changed just now.
+  pure function is_live(k, rows) result(yes)
+    integer, intent(in) :: k
+    type(rows_t), intent(in) :: rows
+    logical :: yes
 
-    if (e <= 0.0_wp) return
-    call list_hits(slowest, rows, hits)
-    if (hits > 0) call move_arms(hits, rows)
-    do i = 1, merge(n_restore, 0, hits > 0)
-      k = 1
-      do m = 1, hits
-        r = rows%hit(m)
-        do while (rows%first(k + 1) <= r)
-          k = k + 1
-        end do
-        associate (row => rows%row(r), own => rows%returned(:, m), a => rows%a(k), b => rows%b(k))
-          p = in_space(own, row)
-          call bounce(e*rows%closing(r), past(rows%v(:, a), rows%v(:, b), row), row, &
-                      rows%total(:, r), own)
-          p = in_space(own, row) - p
-          call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
-                         rows%v(:, a))
-          call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
-                         rows%v(:, b))
+    yes = rows%number == 0
+    if (.not. yes) yes = max(rows%changed(rows%a(k)), rows%changed(rows%b(k))) >= rows%number - 2
+  end function is_live
+
+  !> Keep the impulses from before the first sweep; there is no direction yet.
+  pure subroutine begin_directions(rows)
+    type(rows_t), intent(inout) :: rows
+    integer :: r
+
+    rows%reached(:rows%n_pairs) = .false.
+    do r = 1, rows%n
+      rows%kept(:, r) = rows%row(r)%impulse
+      rows%along(:, r) = 0.0_wp
+    end do
+    rows%square = 0.0_wp
+  end subroutine begin_directions
+
+  !> Go on along the last direction of the impulses, and make the next one of this and the change by
+  !! two sweeps, there and back: beta is the ratio of the squares of the changes, none above 1.
+  pure subroutine accelerate(rows)
+    type(rows_t), intent(inout) :: rows
+    real(wp) :: square, beta, step(3)
+    integer :: k, r
+
+    square = 0.0_wp
+    do k = 1, rows%n_pairs
+      if (.not. is_live(k, rows)) cycle
+      do r = rows%first(k), rows%first(k + 1) - 1
+        square = square + sum((rows%row(r)%impulse - rows%kept(:, r))**2)/rows%row(r)%mass
+      end do
+    end do
+    beta = 0.0_wp
+    if (square < rows%square) beta = square/rows%square
+    rows%square = square
+    do k = 1, rows%n_pairs
+      if (.not. rows%reached(k)) cycle
+      do r = rows%first(k), rows%first(k + 1) - 1
+        associate (row => rows%row(r), along => rows%along(:, r))
+          step = row%impulse - rows%kept(:, r)
+          along = beta*along
+          if (.not. is_live(k, rows)) along = 0.0_wp
+          row%impulse = row%impulse + along
+          rows%kept(:, r) = row%impulse
+          if (any(abs(along) > 0.0_wp)) call push(in_space(along, row), k, r, rows)
+          along = along + step
         end associate
       end do
     end do
-    do m = 1, hits
-      rows%total(:, rows%hit(m)) = rows%total(:, rows%hit(m)) + rows%returned(:, m)
-    end do
-  end subroutine restore
+  end subroutine accelerate
 
-  !> List the rows that bore something, of bodies that were hit.
-  pure subroutine list_hits(slowest, rows, hits)
+  !> End the impacts of a step of n sub-sweeps in it: nothing closes any more, then the rows reached
+  !! give back what they are to, then nothing closes again. None of it is remembered.
+  subroutine end_impacts(n, e, slowest, backward, rows)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: e, slowest   !! restitution [-], closing speed of a hit [m/s]
+    logical, intent(inout) :: backward   !! whether the next sweep is
+    type(rows_t), intent(inout) :: rows
+    real(wp) :: speed
+    integer :: i, k, r
+
+    call mark_hits(slowest, rows, speed)
+    if (.not. speed > 0.0_wp) return
+    rows%small = max(small*slowest, residual*speed)
+    do r = 1, rows%n
+      rows%returned(:, r) = rows%row(r)%impulse
+      rows%row(r)%impulse = rows%total(:, r)
+    end do
+    rows%number = 1
+    call settle(.false., n_finish, backward, rows, speed)
+    do r = 1, rows%n
+      associate (row => rows%row(r), gained => rows%gained(:, r))
+        rows%total(:, r) = row%impulse
+        gained = row%impulse - real(n, wp)*rows%base(:, r)
+        row%impulse = rows%base(:, r)
+        if (all(abs(gained) <= rows%small*row%mass)) then   ! bears on
+          gained = 0.0_wp
+          row%impulse = rows%returned(:, r)
+        end if
+      end associate
+      rows%returned(:, r) = 0.0_wp
+    end do
+    if (e > 0.0_wp) then
+      do i = 0, n_open
+        do k = 1, rows%n_pairs
+          if (rows%reached(k)) call give_back(e, i == 0, k, rows)
+        end do
+      end do
+    end if
+    do r = 1, rows%n
+      rows%total(:, r) = rows%total(:, r) + rows%returned(:, r)
+    end do
+  end subroutine end_impacts
+
+  !> Mark the bodies of the pairs that were hit: a row bore more than before that closed faster than
+  !! the slowest hit when the step began.
+  pure subroutine mark_hits(slowest, rows, speed)
     real(wp), intent(in) :: slowest   !! [m/s]
     type(rows_t), intent(inout) :: rows
-    integer, intent(out) :: hits
+    real(wp), intent(out) :: speed    !! largest of a hit, 0: none [m/s]
     integer :: k, r
 
-    rows%struck = .false.
+    speed = 0.0_wp
+    rows%changed = never
     do k = 1, rows%n_pairs
       do r = rows%first(k), rows%first(k + 1) - 1
-        if (rows%largest(r) > 0.0_wp .and. rows%closing(r) < -slowest) then
-          rows%struck([rows%a(k), rows%b(k)]) = .true.
-        end if
+        if (rows%closing(r) >= -slowest .or. .not. rows%largest(r) > 0.0_wp) cycle
+        speed = max(speed, -rows%closing(r))
+        call mark(0, k, rows)
       end do
     end do
-    hits = 0
-    do k = 1, rows%n_pairs
-      associate (a => rows%a(k), b => rows%b(k))
-        if (.not. (rows%struck(a) .and. rows%inverse_mass(a) > 0.0_wp) .and. &
-            .not. (rows%struck(b) .and. rows%inverse_mass(b) > 0.0_wp)) cycle
-      end associate
-      do r = rows%first(k), rows%first(k + 1) - 1
-        if (.not. rows%largest(r) > 0.0_wp) cycle
-        if (abs(rows%closing(r)) <= slowest) rows%closing(r) = 0.0_wp
-        hits = hits + 1
-        rows%hit(hits) = r
-        rows%returned(:, hits) = 0.0_wp
-      end do
-    end do
-  end subroutine list_hits
+  end subroutine mark_hits
 
-  !> Let all turn by what the way of the bodies added to their arms, and move the contacts of the
-  !! rows that were hit half way from a to b, see `half_way_past`. The sum of twists takes the
-  !! old arms: what these impulses were until now is added to `turn`.
-  pure subroutine move_arms(hits, rows)
-    integer, intent(in) :: hits
+  !> Mark the bodies of a pair that yield as changed by a sweep over an impact.
+  pure subroutine mark(number, k, rows)
+    integer, intent(in) :: number, k
     type(rows_t), intent(inout) :: rows
-    real(wp) :: way(3), p(3), closing
-    integer :: k, m, r
 
-    do k = 1, rows%n_pairs
-      associate (a => rows%a(k), b => rows%b(k))
-        rows%v(4:6, a) = rows%v(4:6, a) + matmul(rows%inverse_inertia(:, :, a), rows%turn(:, k))
-        rows%v(4:6, b) = rows%v(4:6, b) + matmul(rows%inverse_inertia(:, :, b), rows%turn(:, k))
-      end associate
-    end do
-    k = 1
-    do m = 1, hits
-      r = rows%hit(m)
-      do while (rows%first(k + 1) <= r)
-        k = k + 1
-      end do
-      way = half_way_past(k, rows)
-      associate (row => rows%row(r), total => rows%total(:, r))
-        p = in_space(total, row)
-        rows%turn(:, k) = rows%turn(:, k) - cross(way, p)
-        row%arm_a = row%arm_a - way
-        row%arm_b = row%arm_b + way
-        if (abs(rows%closing(r)) > 0.0_wp) then
-          closing = dot_product(row%n, past(rows%v_start(:, rows%a(k)), rows%v_start(:, &
-            rows%b(k)), row))
-          rows%closing(r) = merge(min(closing, 0.0_wp), closing, rows%closing(r) < 0.0_wp)
+    if (rows%inverse_mass(rows%a(k)) > 0.0_wp) rows%changed(rows%a(k)) = number
+    if (rows%inverse_mass(rows%b(k)) > 0.0_wp) rows%changed(rows%b(k)) = number
+  end subroutine mark
+
+  !> Let the rows of a pair give back e times what their impulses changed, within the bounds; or, in
+  !! the sweeps after that, let no closed row close, and none return less.
+  pure subroutine give_back(e, first, k, rows)
+    real(wp), intent(in) :: e      !! [-]
+    logical, intent(in) :: first
+    integer, intent(in) :: k
+    type(rows_t), intent(inout) :: rows
+    real(wp) :: least, before(3), whole(3), half(3), bound, length
+    integer :: r
+
+    half = half_way_past(k, rows)
+    do r = rows%first(k), rows%first(k + 1) - 1
+      associate (row => rows%row(r), back => rows%returned(:, r), total => rows%total(:, r), &
+        a => rows%a(k), b => rows%b(k))
+        before = back
+        least = max(e*rows%gained(1, r), -total(1))
+        if (first) then
+          back = [least, e*rows%gained(2:3, r)]
+          whole = total + back
+          length = norm2(whole(2:3))
+          bound = row%friction*whole(1)
+          if (length > bound) back(2:3) = whole(2:3)*(bound/length) - total(2:3)
+        else if (total(1) > 0.0_wp .or. row%gap + dot_product(row%n, row%way) <= 0.0_wp) then
+          back(1) = max(least, back(1) - row%mass*dot_product(row%n, past(rows%v(:, a), &
+            rows%v(:, b), row%arm_a - half, row%arm_b + half)))
         end if
+        call push(in_space(back - before, row), k, r, rows)
       end associate
     end do
-  end subroutine move_arms
-
-  !> Correct the impulse by which a row of a body that was hit opens at the speed asked for.
-  pure subroutine bounce(wanted, v, row, before, own)
-    real(wp), intent(in) :: wanted      !! e v_n(start) [m/s]
-    real(wp), intent(in) :: v(3)        !! of b past a [m/s]
-    type(row_t), intent(in) :: row
-    real(wp), intent(in) :: before(3)   !! impulse of the step until now [N s]
-    real(wp), intent(inout) :: own(3)   !! that of the restitution [N s]
-    real(wp) :: normal, slip(3), whole(3)
-
-    normal = own(1)
-    own(1) = max(-before(1), normal - row%mass*(dot_product(row%n, v) + wanted))
-    slip = v + (own(1) - normal)*row%response
-    whole = before + own
-    call rub(row, dot_product(row%e1, slip), dot_product(row%e2, slip), whole)
-    own(2:3) = whole(2:3) - before(2:3)
-  end subroutine bounce
+  end subroutine give_back
 
 end module impulse_sweeps_m

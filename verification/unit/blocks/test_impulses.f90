@@ -1,0 +1,112 @@
+!> Impacts by impulses: chains of bodies, energy, and heavy blocks on light ones.
+module test_impulses_m
+  use kinds_m, only: wp
+  use check_m, only: check, checked
+  use errors_m, only: to_text
+  use random_counter_m, only: uniform, random_rotation
+  use rigid_body_m, only: kinetic_energy
+  use world_m, only: world_t, set_up, body, move
+  implicit none
+  private
+  public :: test_impulses
+
+  real(wp), parameter :: d = 0.02_wp   !! edge of the cubes [m]
+  real(wp), parameter :: g = 9.81_wp   !! [m/s2]
+  real(wp), parameter :: dt = 2.0e-3_wp   !! [s]
+  character(*), parameter :: cube = '&shape name="cube" kind="cube" size=.02/ '
+
+contains
+
+  subroutine test_impulses()
+    call check_chains()
+    call check_random_pairs()
+    call check_heavy_on_light()
+  end subroutine test_impulses
+
+  subroutine start(contact, groups, world)
+    character(*), intent(in) :: contact, groups
+    type(world_t), intent(out) :: world
+
+    call set_up('&run t_end=1 physics="dry"/ &contact solver="impulses" sleep=F '//contact//'/ ' &
+      //groups, world)
+  end subroutine start
+
+  !> A cube at 1 m/s on a column of k resting cubes: all stop at once, the upper one returns with e
+  !! of it (Poisson), and never more than e^2 of the energy.
+  subroutine check_chains()
+    integer, parameter :: columns(5) = [0, 1, 2, 4, 12]
+    real(wp), parameter :: e(8) = [0.3_wp, 0.3_wp, 0.3_wp, 0.3_wp, 0.3_wp, 0.0_wp, 0.6_wp, 0.9_wp]
+    type(world_t) :: world
+    character(:), allocatable :: bodies
+    real(wp) :: back, energy
+    integer :: i, j, k
+
+    do i = 1, size(e)
+      k = columns(merge(i, 3, i <= 5))
+      bodies = ''
+      do j = 1, k
+        bodies = bodies//body('cube', [0.5_wp, 0.5_wp, (j - 0.5_wp)*d])
+      end do
+      call start('restitution='//to_text(e(i)), '&grid cells=3*2 length=3*1/ '//cube//bodies &
+        //body('cube', [0.5_wp, 0.5_wp, (k + 0.5_wp)*d + 0.1_wp - 0.05_wp*g*0.1_wp], &
+        [0.0_wp, 0.0_wp, -1.0_wp + 0.1_wp*g]), world)
+      call move(world, 48, dt)
+      back = 0.0_wp
+      energy = 0.0_wp
+      do j = 1, 5
+        call move(world, 1, dt)
+        if (.not. world%blocks%v(3, k + 1) > back) cycle
+        back = world%blocks%v(3, k + 1)
+        energy = 2*kinetic_energy(world%blocks)/world%blocks%mass(1)
+      end do
+      call check('a cube on '//to_text(k)//', e = '//to_text(e(i)), back, e(i), &
+        max(0.1_wp*e(i), 0.01_wp))
+      call check('no more than e^2 of the energy', energy < 1.02_wp*e(i)**2 + 1.0e-3_wp)
+    end do
+  end subroutine check_chains
+
+  !> Two cubes that meet anyhow in space gain no energy at e = 1, and lose next to none without
+  !! friction.
+  subroutine check_random_pairs()
+    type(world_t) :: world
+    real(wp) :: energy, most, mean
+    integer :: i, n
+
+    n = merge(5, 60, checked)
+    most = 0.0_wp
+    mean = 0.0_wp
+    do i = 1, n
+      call start('restitution=1 friction=0', '&grid cells=3*2 length=3*1/ &fluid gravity=3*0/ ' &
+        //cube//body('cube', 0.5_wp - 0.5_wp*[d*uniform(5, i, 1), d*uniform(5, i, 2), 0.036_wp], &
+        [0.0_wp, 0.0_wp, 0.5_wp], random_rotation(5, i))//body('cube', 0.5_wp &
+        + [0.0_wp, 0.0_wp, 0.018_wp], [0.0_wp, 0.0_wp, -0.5_wp], random_rotation(6, i)), world)
+      energy = kinetic_energy(world%blocks)
+      call move(world, 20, dt)
+      energy = kinetic_energy(world%blocks)/energy
+      most = max(most, energy)
+      mean = mean + energy/n
+    end do
+    call check('no energy is made', most, 1.0_wp, 0.02_wp)
+    call check('nor lost', mean, 1.0_wp, 0.005_wp)
+  end subroutine check_random_pairs
+
+  !> A heavy cube on a plate of a hundredth of its mass, at a long contact time, sinks in by less
+  !! than 1 % of its thickness.
+  subroutine check_heavy_on_light()
+    type(world_t) :: world
+    real(wp) :: deepest
+    integer :: i
+
+    call start('contact_time=.02', '&grid cells=3*2 length=3*8/ &shape name="cube" kind="cube" ' &
+      //'size=2 density=2300/ &shape name="plate" kind="box" size=2,2,.43 density=107/ ' &
+      //body('plate', [4.0_wp, 4.0_wp, 0.215_wp])//body('cube', [4.0_wp, 4.0_wp, 1.43_wp]), world)
+    deepest = 0.0_wp
+    do i = 1, 30
+      call move(world, 1, 0.02_wp)
+      if (i > 15) deepest = max(deepest, world%contact%overlap_max)
+    end do
+    call check('a plate under a heavy cube', deepest < 0.01_wp*0.43_wp)
+    call check('both at rest', maxval(abs(world%blocks%v)), 0.0_wp, 1.0e-4_wp)
+  end subroutine check_heavy_on_light
+
+end module test_impulses_m
