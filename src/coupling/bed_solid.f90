@@ -36,8 +36,8 @@ contains
     real(wp), intent(out) :: centre(3)   !! a corner of cells [m]
     type(shape_t), intent(out) :: solid
     type(parts_t) :: parts
-    real(wp) :: p(3, max_clip_corners), low(3), high(3)
-    real(wp), allocatable :: floor(:, :)
+    real(wp), dimension(3, max_clip_corners) :: p, floor
+    real(wp) :: low(3), high(3)
     integer :: d, f, n, beyond(3)
 
     beyond = merge(n_halo + 1, 0, grid%periodic)
@@ -56,9 +56,9 @@ contains
           .or. any(all(p(:2, :n) >= spread(high(:2), 2, n), 2))) cycle
       call add_facet(p(:, :n), parts)
       ! the floor of the prism under it; that under a vertical one has no area and no effect
-      floor = p(:, n:1:-1)
-      floor(3, :) = low(3)
-      call add_facet(floor, parts)
+      floor(1:2, :n) = p(1:2, n:1:-1)
+      floor(3, :n) = low(3)
+      call add_facet(floor(:, :n), parts)
       call add_walls(p(:, :n), low, high, parts)
       call add_prism(p(:, :n), low(3), min_tet*grid%volume, parts)
     end do
