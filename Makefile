@@ -84,7 +84,8 @@ help:
 say = $(if $(V),,@echo '  $(1)';)
 
 # NO_LTO=1 links as the objects are; the other way of linking links anew.
-link := $(flags) $(if $(NO_LTO),-fno-lto)
+# What gcc thinks perhaps not set is told of each file; across files it errs.
+link := $(flags) -Wno-maybe-uninitialized $(if $(NO_LTO),-fno-lto)
 $(B)/link: FORCE
 	$(call keep,$(link))
 $(binary): $$(OBJECTS_mics) $(B)/link
