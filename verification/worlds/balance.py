@@ -59,7 +59,7 @@ def balance(world: World, folder: Path) -> None:
             # sub-cells do not keep the volume of a body, for which a closed tank has no way out
             if world.value("numerics", "solid_fraction") == "exact" or "open" in kinds:
                 below("excess of a cell", s.volume_excess_max, tolerance * s.time[-1] + CLOSED)
-        # the options of the paper gain energy beside very viscous fluids (docs/decisions/surface.md)
+        # options of the paper gain energy beside very viscous fluids (docs/decisions/surface.md)
         if not mics and world.value("numerics", "momentum") == "conservative":
             below("energy over what was put in", np.fmax(s.energy_excess, 0.0), 0.01)
     if not b.n:
