@@ -91,6 +91,18 @@ def test_angles_turn_as_documented(tmp_path: Path) -> None:
     assert own == pytest.approx(np.linalg.multi_dot(turns), abs=1e-12)
 
 
+def test_units_and_names_of_clients(tmp_path: Path) -> None:
+    """Feet to metres, a heading from north to the turn from x."""
+    table = "Unit,Type,Easting [ft],Northing [cm],Elevation (mm),Time [min],Heading [rad]\n"
+    table += "A1,cube,0.328083989501312,15,50,0.01,1.2\n"
+    assert mics([put(tmp_path, table)], tmp_path).returncode == 0
+    bodies = Run(tmp_path / "mics-out").bodies
+    assert bodies.position[0, 0] == pytest.approx([0.1, 0.15, 0.05], abs=1e-14)
+    assert bodies.release_time[0] == pytest.approx(0.6, abs=1e-14)
+    own = rotation_matrix(bodies.quaternion[0, 0])
+    assert own[:, 0] == pytest.approx([np.sin(1.2), np.cos(1.2), 0.0], abs=1e-12)
+
+
 def test_a_long_plan_is_checked_quickly(tmp_path: Path) -> None:
     """1000 rows, half of them fixed, take at most 10 s of processor time."""
     rows = [

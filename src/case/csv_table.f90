@@ -3,9 +3,10 @@
 !! Commas part the cells; semicolons, or tabs, if the line of names holds any. A cell may stand
 !! between double quotes, a quote inside doubled. Blanks around a cell, empty lines, lines of empty
 !! cells and lines that begin with `#` mean nothing; neither do a byte-order mark, nor how lines
-!! end. Text is UTF-8; any other is taken as Latin-1.
+!! end. Text is UTF-8; any other is taken as Latin-1. A unit in brackets after a name is that of the
+!! numbers below, which are converted.
 module csv_table_m
-  use kinds_m, only: wp, name_length
+  use kinds_m, only: wp, name_length, pi
   use errors_m, only: problems_t, to_text
   use file_words_m, only: words_t, read_whole
   use value_text_m, only: parse_real, nearest_name, lower_case, printable, quoted_text, &
@@ -16,18 +17,28 @@ module csv_table_m
   public :: csv_table_t, read_table
 
   integer, parameter :: max_columns = 64   !! of a table
+  integer, parameter :: n_units = 16
+  character(*), parameter :: unit(n_units) = [character(12) :: 'm', 'cm', 'mm', 'ft', &
+    'us survey ft', 's', 'min', 'h', 'deg', 'degrees', 'rad', 'm/s', 'cm/s', 'mm/s', 'ft/s', 'km/h']
+  character(*), parameter :: si(n_units) = [character(3) :: 'm', 'm', 'm', 'm', 'm', 's', 's', &
+    's', 'deg', 'deg', 'deg', 'm/s', 'm/s', 'm/s', 'm/s', 'm/s']   !! what it is converted to
+  real(wp), parameter :: factor(n_units) = [1.0_wp, 0.01_wp, 0.001_wp, 0.3048_wp, &
+    1200.0_wp/3937.0_wp, 1.0_wp, 60.0_wp, 3600.0_wp, 1.0_wp, 1.0_wp, 180.0_wp/pi, 1.0_wp, &
+    0.01_wp, 0.001_wp, 0.3048_wp, 1.0_wp/3.6_wp]
   character(*), parameter :: blank = ' '//achar(9)
 
   type :: csv_table_t
     integer :: n_rows = 0
     integer :: head = 0                              !! line of the names
     character(name_length), allocatable :: name(:)   !! (columns) in small letters
+    character(name_length), allocatable, private :: unit(:)   !! (columns) in brackets
+    real(wp), allocatable, private :: factor(:)      !! (columns) of its numbers
     integer, allocatable :: line(:)                  !! (rows) of the file
     character(:), allocatable, private :: text       !! the file; rows by their ends in it
     integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, rows)
   contains
     procedure :: cell, column, number, report => table_report
-    procedure :: check_names
+    procedure :: check_names, rename
   end type csv_table_t
 
 contains
@@ -114,18 +125,25 @@ contains
     end do
   end subroutine cut_line
 
-  !> The names of the columns, in small letters; a unit in brackets after a name is left away.
+  !> The names of the columns and their units, in small letters.
   subroutine set_names(table, line, first, final, problems)
     type(csv_table_t), intent(inout) :: table
     integer, intent(in) :: line, first(:), final(:)
     type(problems_t), intent(inout) :: problems
     character(:), allocatable :: word
     character(name_length) :: name(size(first))
-    integer :: c
+    integer :: c, at
 
+    allocate (table%unit(size(first)), table%factor(size(first)))
+    table%unit = ''
+    table%factor = 1.0_wp
     do c = 1, size(first)
       word = lower_case(plain(table%text(first(c):final(c))))
-      if (scan(word, '[(') > 1) word = word(:scan(word, '[(') - 1)
+      at = scan(word, '[(')
+      if (at > 1) then
+        table%unit(c) = adjustl(word(at + 1:scan(word//']', '])') - 1))
+        word = word(:at - 1)
+      end if
       name(c) = word
       if (len_trim(word) == 0) call problems%add_message('line '//to_text(line)//', column ' &
         //to_text(c)//': has no name')
@@ -228,7 +246,7 @@ contains
     else
       call parse_real(text, x, info)
       select case (info)
-      case (value_ok)
+      case (value_ok); x = self%factor(column)*x
       case (value_not_finite); what = 'must be a finite number'
       case (value_too_large); what = 'must be 0 or between 1e-20 and 1e20 in size'
       case default
@@ -241,20 +259,48 @@ contains
     call self%report(row, column, what, problems)
   end subroutine number
 
-  !> Columns that are not known, and required ones that are missing.
-  subroutine check_names(self, known, n_required, problems)
-    class(csv_table_t), intent(in) :: self
+  !> Call a column by the name that the program has for it, unless there is one of that name.
+  subroutine rename(self, from, to)
+    class(csv_table_t), intent(inout) :: self
+    character(*), intent(in) :: from, to
+
+    if (self%column(from) > 0 .and. self%column(to) == 0) self%name(self%column(from)) = to
+  end subroutine rename
+
+  !> Columns that are not known, required ones that are missing, and units; numbers are converted
+  !! to those of the program.
+  subroutine check_names(self, known, units, n_required, problems)
+    class(csv_table_t), intent(inout) :: self
     character(*), intent(in) :: known(:)      !! the required ones first
+    character(*), intent(in) :: units(:)      !! of the known ones; empty: none
     integer, intent(in) :: n_required
     type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: list
-    integer :: c
+    character(:), allocatable :: list, place
+    integer :: c, k, u
 
+    list = ''
     do c = 1, size(self%name)
-      if (any(known == self%name(c)) .or. self%name(c) == '') cycle
-      call problems%add_message('line '//to_text(self%head)//', column '//to_text(c)//' (' &
-        //printable(trim(self%name(c)))//'): unknown, nearest known: ' &
-        //nearest_name(trim(self%name(c)), known))
+      if (self%name(c) == '') cycle
+      place = 'line '//to_text(self%head)//', column '//to_text(c)//' (' &
+        //printable(trim(self%name(c)))//')'
+      k = findloc(known == self%name(c), .true., 1)
+      if (k == 0) then
+        call problems%add_message(place//': unknown, nearest known: ' &
+          //nearest_name(trim(self%name(c)), known))
+        cycle
+      end if
+      if (units(k) == '' .or. self%unit(c) == '') cycle
+      u = findloc(unit == self%unit(c) .and. si == units(k), .true., 1)
+      if (u > 0) then
+        self%factor(c) = factor(u)
+        cycle
+      end if
+      list = ''
+      do u = 1, n_units
+        if (si(u) == units(k)) list = list//', '//trim(unit(u))
+      end do
+      call problems%add_message(place//' = '//quoted_text(printable(trim(self%unit(c)))) &
+        //': no unit that is known here, must be one of '//list(3:))
     end do
     list = ''
     do c = 1, n_required

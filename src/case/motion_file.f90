@@ -17,6 +17,7 @@ module motion_file_m
 
   character(name_length), parameter :: columns(8) = [character(name_length) :: 'time', 'x', 'y', &
     'z', 'qw', 'qx', 'qy', 'qz']
+  character(*), parameter :: units(8) = [character(3) :: 's', 'm', 'm', 'm', '', '', '', '']
   integer, parameter :: n_required = 4
   real(wp), parameter :: largest_turn = 170.0_wp   !! from row to row [degrees]
   real(wp), parameter :: same_place = 1.0e-6_wp    !! of `position` and the table [m]
@@ -41,7 +42,7 @@ contains
       associate (body => case%body(b))
         call read_table(found_file(body%motion), table, found)
         if (size(table%name) > 0) then
-          call table%check_names(columns, n_required, found)
+          call table%check_names(columns, units, n_required, found)
           turns = any([(table%column(columns(i)) > 0, i=n_required + 1, size(columns))])
           if (turns .and. body%attitude_given) call found%add_message('has an attitude, and so ' &
             //'has the &body; give one only')

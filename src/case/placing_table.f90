@@ -22,9 +22,15 @@ module placing_table_m
   !> Columns, the five that every table has first.
   character(name_length), parameter :: known(*) = [character(name_length) :: 'shape', 'x', 'y', &
     'z', 'time', 'qw', 'qx', 'qy', 'qz', 'yaw_deg', 'pitch_deg', 'roll_deg', 'vx', 'vy', 'vz', &
-    'fixed', 'name']
+    'fixed', 'name', 'heading']
+  character(*), parameter :: units(*) = [character(3) :: '', 'm', 'm', 'm', 's', '', '', '', '', &
+    'deg', 'deg', 'deg', 'm/s', 'm/s', 'm/s', '', '', 'deg']
+  !> Names in the tables of clients, and those of the program.
+  character(name_length), parameter :: client(2, 6) = reshape([character(name_length) :: &
+    'type', 'shape', 'easting', 'x', 'northing', 'y', 'elevation', 'z', 'unit', 'name', &
+    'heading_deg', 'heading'], [2, 6])
   integer, parameter :: n_required = 5, c_shape = 1, c_x = 2, c_time = 5, c_q = 6, c_yaw = 10, &
-    c_v = 13, c_fixed = 16, c_name = 17
+    c_v = 13, c_fixed = 16, c_name = 17, c_heading = 18
 
 contains
 
@@ -66,9 +72,15 @@ contains
     drop%count = table%n_rows
     allocate (drop%row(table%n_rows))
     if (size(table%name) == 0) return
-    call table%check_names(known, n_required, problems)
+    do k = 1, size(client, 2)
+      call table%rename(trim(client(1, k)), client(2, k))
+    end do
+    call table%check_names(known, units, n_required, problems)
     column = [(table%column(known(k)), k=1, size(known))]
-    if (any(column(c_q:c_q + 3) > 0) .and. any(column(c_yaw:c_yaw + 2) > 0)) then
+    if (column(c_heading) > 0 .and. column(c_yaw) > 0) call problems%add_message('line ' &
+      //to_text(table%head)//': give yaw_deg or a heading, not both')
+    if (any(column(c_q:c_q + 3) > 0) .and. (any(column(c_yaw:c_yaw + 2) > 0) &
+                                            .or. column(c_heading) > 0)) then
       call problems%add_message('line '//to_text(table%head) &
         //': give a quaternion or angles, not both')
     else if (any(column(c_q:c_q + 3) > 0) .and. any(column(c_q:c_q + 3) == 0)) then
@@ -159,7 +171,7 @@ contains
     integer, intent(in) :: r, column(:)
     real(wp), intent(inout) :: q(4)
     type(problems_t), intent(inout) :: problems
-    real(wp) :: part(4), angle(3)
+    real(wp) :: part(4), angle(3), heading
     logical :: ok
     integer :: k
 
@@ -181,6 +193,11 @@ contains
       do k = 1, 3
         call table%number(r, column(c_yaw + k - 1), .false., angle(k), ok, problems)
       end do
+      if (column(c_heading) > 0) then   ! of the x axis of the body, from north towards east
+        heading = 90.0_wp
+        call table%number(r, column(c_heading), .false., heading, ok, problems)
+        angle(1) = 90.0_wp - heading
+      end if
       q = attitude_of_angles(angle(1), angle(2), angle(3))
     end if
   end subroutine read_attitude
