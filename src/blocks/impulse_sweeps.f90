@@ -39,7 +39,7 @@ module impulse_sweeps_m
   integer, parameter :: worth_threads = 512     !! fewer rows are the work of one thread
   real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
-  real(wp), parameter :: small = 0.01_wp         !! change that ends an impact, over slow hits [-]
+  real(wp), parameter :: small = 0.03_wp         !! change that ends an impact, over slow hits [-]
   real(wp), parameter :: residual = 1.0e-7_wp   !! the same over the fastest or first change
 
 contains
