@@ -544,7 +544,7 @@ contains
         if (first) then
           back = [least, e*rows%gained(2:3, r)]
           whole = total + back
-          length = norm2(whole(2:3))
+          length = sqrt(whole(2)**2 + whole(3)**2)
           bound = row%friction*whole(1)
           if (length > bound) back(2:3) = whole(2:3)*(bound/length) - total(2:3)
         else if (total(1) > 0.0_wp .or. row%gap + dot_product(row%n, row%way) <= 0.0_wp) then
