@@ -76,7 +76,8 @@ contains
     if (present(bed)) self%has_bed = bed%there
     if (self%has_bed) call make_bed_solid(grid, bed, self%bed_centre, self%bed)
     n = blocks%n
-    allocate (self%x(3, n), self%q(4, n), self%present(n))
+    allocate (self%x(3, n), self%q(4, n), source=0.0_wp)
+    allocate (self%present(n), source=.false.)
     if (self%has_bed) n = n + 1
     allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
     call voxels_init(grid, n, self%voxels)
