@@ -12,7 +12,7 @@ module ground_m
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_place
   use neighbours_m, only: bins_t, bins_build, nearest_shift
-  use overlap_m, only: overlap_t
+  use overlap_m, only: overlap_t, release_overlap
   use overlap_solid_m, only: solid_t
   implicit none
   private
@@ -67,7 +67,7 @@ contains
     end if
   end function height_on_top
 
-  !> Does block c stand on something, no further in it than a hundredth of its edge?
+  !> Does block c stand on something, no further in it than a release allows?
   function stands(walls, blocks, c, overlap) result(yes)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
@@ -76,7 +76,7 @@ contains
     logical :: yes
 
     associate (edge => blocks%shapes(blocks%shape(c))%smallest_edge)
-      yes = min_gap(walls, blocks, c, overlap, -0.01_wp*edge) <= gap_of(blocks, c)
+      yes = min_gap(walls, blocks, c, overlap, -release_overlap*edge) <= gap_of(blocks, c)
     end associate
   end function stands
 

@@ -31,7 +31,7 @@ module impulse_sweeps_m
   public :: solve_rows
 
   integer, parameter :: n_correct = 2           !! sweeps with bias; one lets the stack creep
-  integer, parameter :: n_finish = 200           !! sweeps over an impact, at most
+  integer, parameter :: n_finish = 200          !! sweeps over an impact, at most
   integer, parameter :: n_open = 6              !! sweeps after what it returned
   integer, parameter :: n_hard = 400            !! sweeps where masses differ much, at most
   real(wp), parameter :: max_turn = 0.02_wp     !! by contact in the rest of a step, times e [rad]
@@ -39,7 +39,7 @@ module impulse_sweeps_m
   integer, parameter :: worth_threads = 512     !! fewer rows are the work of one thread
   real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
-  real(wp), parameter :: small = 0.03_wp         !! change that ends an impact, over slow hits [-]
+  real(wp), parameter :: small = 0.03_wp        !! change that ends an impact, over slow hits [-]
   real(wp), parameter :: residual = 1.0e-7_wp   !! the same over the fastest or first change
 
 contains

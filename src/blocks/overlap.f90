@@ -18,6 +18,7 @@ module overlap_m
   implicit none
   private
   public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place, exclude
+  public :: release_overlap
 
   real(wp), parameter :: release_overlap = 0.01_wp   !! allowed overlap over smallest edge
 

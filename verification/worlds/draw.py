@@ -132,6 +132,12 @@ def rounded(values: list[float]) -> list[float]:
     return [float(f"{v:.6g}") for v in values]
 
 
+def tank(wanted: list[float], cell: list[float]) -> tuple[list[int], list[float]]:
+    """Cells and lengths of the smallest tank of such cells that is at least so long."""
+    cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
+    return cells, rounded([k * c for k, c in zip(cells, cell, strict=True)])
+
+
 @st.composite
 def still(draw: Draw) -> World:
     """Water at rest with one to three blocks held through its surface."""
@@ -142,8 +148,7 @@ def still(draw: Draw) -> World:
     level = across * draw(number(0.7, 1.3))
     ends = draw(sides())
     wanted = [*room(across, ends, 1.15, [n, 1]), level + across]
-    cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
-    length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
+    cells, length = tank(wanted, cell)
     liquid = draw(fluid(across))
     dt = step(draw(number(0.1, 0.8)), liquid, cell)
     groups: list[tuple[str, Group]] = [
@@ -175,8 +180,7 @@ def lying(draw: Draw) -> World:
     level = across * draw(number(0.5, 2.5))
     ends = draw(sides(("no_slip", "slip")))
     wanted = [*room(across, ends, 1.6, [n, 1]), max(level, across * floors) + 0.5 * across]
-    cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
-    length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
+    cells, length = tank(wanted, cell)
     liquid = draw(fluid(across))
     dt = step(draw(number(0.05, 0.4)), liquid, cell)
     groups: list[tuple[str, Group]] = [
@@ -262,8 +266,7 @@ def world(
     places = [draw(st.integers(1, 2)) for _ in "xyz"]  # for a block each
     ends = draw(sides())
     wanted = [*room(across, ends, 1.2, places[:2]), 1.2 * across * (places[2] + 1)]
-    cells = [ceil(w / c) for w, c in zip(wanted, cell, strict=True)]
-    length = rounded([k * c for k, c in zip(cells, cell, strict=True)])
+    cells, length = tank(wanted, cell)
     liquid = draw(fluid(across))
     dt = step(draw(number(0.05, 0.4)), liquid, cell)
     steps = draw(st.integers(4, 24))
