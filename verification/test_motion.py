@@ -191,3 +191,35 @@ def test_the_same_place_and_free_bodies(tmp_path: Path) -> None:
     assert "needs fixed = .true." in free.stderr and free.returncode == 2
     none = mics(tmp_path / "none", good.replace("way.csv", "no.csv"), DOOR)
     assert "there is no such file" in none.stderr and none.returncode == 2
+
+
+AWAY = "time,x,y,z\n0,0.03,0.04,0.04\n1,0.13,0.04,0.04\n"
+BOX = "&body shape = 'cube'  fixed = T  {} /\n"
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        (
+            BOX.format("position = 0.1, 0.04, 0.05"),
+            "at 0.535 s it reaches 0.000305 m into the &body on line 6",
+        ),
+        (BOX.format("position = 0.1, 0.04, 0.05  release_time = 0.7"), "at 0.701 s it reaches 0.0"),
+        (BOX.format("motion = 'across.csv'"), "into the &body on line 4"),
+        (
+            "&bed file = 'bed.txt' /\n",
+            "at 0.535 s it reaches more than 1 % of its size into the bed",
+        ),
+        (BOX.format("position = 0.1, 0.04, 0.09") + "&fluid water_level = 0.1 /\n", ""),
+        (BOX.format("position = 0.1, 0.04, 0.05  release_time = 1.1"), ""),
+        (BOX.replace("fixed = T", "").format("position = 0.1, 0.04, 0.02"), ""),
+    ],
+)
+def test_what_stands_in_the_way(other: str, told: str, tmp_path: Path) -> None:
+    """Fixed bodies, moved ones and the bed are met before the run; free blocks are pushed."""
+    (tmp_path / "across.csv").write_text("time,x,y,z\n0,0.1,0.015,0.05\n1,0.1,0.065,0.05\n")
+    (tmp_path / "bed.txt").write_text("3 2 0 0 .08 .08\n0 0 .08 0 0 .08\n")
+    case = DRY.format(end=1) + PLATE + MOVED.format(more="") + CUBE.splitlines()[0] + "\n" + other
+    done = mics(tmp_path, case, AWAY, "--check")
+    assert (done.returncode, told in done.stderr) == (2 if told else 0, True), done.stderr
+    assert len(done.stderr.splitlines()) == (1 if told else 0) or "across" in done.stderr

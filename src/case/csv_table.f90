@@ -30,15 +30,15 @@ module csv_table_m
   type :: csv_table_t
     integer :: n_rows = 0
     integer :: head = 0                              !! line of the names
-    character(name_length), allocatable :: name(:)   !! (columns) in small letters
-    character(name_length), allocatable, private :: unit(:)   !! (columns) in brackets
+    character(name_length), allocatable :: name(:)   !! (columns) in small letters, without units
     real(wp), allocatable, private :: factor(:)      !! (columns) of its numbers
     integer, allocatable :: line(:)                  !! (rows) of the file
+    integer :: n_doubtful = 0, doubtful = 0   !! remarks that look like rows, line of the first
     character(:), allocatable, private :: text       !! the file; rows by their ends in it
-    integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, rows)
+    integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, 0:rows), 0: the names
   contains
-    procedure :: cell, column, number, report => table_report
-    procedure :: check_names, rename
+    procedure :: cell, column, number, place, report => table_report
+    procedure :: check_names, rename, warn_of_remarks
   end type csv_table_t
 
 contains
@@ -52,7 +52,7 @@ contains
     character(1) :: separator
     integer :: at, last, line, n, n_lines, i
     integer :: first(max_columns), final(max_columns)
-    logical :: quoted
+    logical :: quoted, remark
 
     allocate (table%name(0), table%line(0), table%first(0, 0), table%last(0, 0))
     call read_whole(file, words)
@@ -75,13 +75,23 @@ contains
       associate (row => table%text(at:last))
         first(1) = at
         at = last + 2
-        if (verify(row, blank//separator) == 0 .or. index(adjustl(row), '#') == 1) cycle
+        if (verify(row, blank//separator) == 0) cycle
+        remark = index(adjustl(row), '#') == 1
+        if (remark .and. size(table%name) == 0) cycle
         if (size(table%name) == 0) then   ! the line of names says what parts the cells
           if (index(row, ',') == 0 .and. index(row, achar(9)) > 0) separator = achar(9)
           if (index(row, ';') > 0) separator = ';'
         end if
       end associate
       call cut_line(table%text, first(1), last, separator, n, first, final, quoted)
+      if (remark) then   ! it may be a row that is lost if it has as many cells and a number in them
+        if (n /= size(table%name)) cycle
+        if (.not. any([(first(i) <= final(i) .and. verify(table%text(first(i):final(i)), &
+          '+-.0123456789') == 0, i=2, n)])) cycle
+        table%n_doubtful = table%n_doubtful + 1
+        if (table%n_doubtful == 1) table%doubtful = line
+        cycle
+      end if
       if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
         //': no second " closes the text on this line')
       do while (n > max(1, size(table%name)))   ! a comma at the end of each line
@@ -92,9 +102,11 @@ contains
         call add_row(table, line, n, first, final, problems)
         cycle
       end if
-      call set_names(table, line, first(:n), final(:n), problems)
       deallocate (table%line, table%first, table%last)
-      allocate (table%line(n_lines), table%first(n, n_lines), table%last(n, n_lines))
+      allocate (table%line(n_lines), table%first(n, 0:n_lines), table%last(n, 0:n_lines))
+      table%first(:, 0) = first(:n)
+      table%last(:, 0) = final(:n)
+      call set_names(table, line, n, problems)
     end do
     if (size(table%name) == 0) call problems%add_message('the file is empty')
   end subroutine read_table
@@ -125,34 +137,27 @@ contains
     end do
   end subroutine cut_line
 
-  !> The names of the columns and their units, in small letters.
-  subroutine set_names(table, line, first, final, problems)
+  !> The names of the columns.
+  subroutine set_names(table, line, n, problems)
     type(csv_table_t), intent(inout) :: table
-    integer, intent(in) :: line, first(:), final(:)
+    integer, intent(in) :: line, n
     type(problems_t), intent(inout) :: problems
     character(:), allocatable :: word
-    character(name_length) :: name(size(first))
-    integer :: c, at
+    integer :: c
 
-    allocate (table%unit(size(first)), table%factor(size(first)))
-    table%unit = ''
-    table%factor = 1.0_wp
-    do c = 1, size(first)
-      word = lower_case(plain(table%text(first(c):final(c))))
-      at = scan(word, '[(')
-      if (at > 1) then
-        table%unit(c) = adjustl(word(at + 1:scan(word//']', '])') - 1))
-        word = word(:at - 1)
-      end if
-      name(c) = word
-      if (len_trim(word) == 0) call problems%add_message('line '//to_text(line)//', column ' &
-        //to_text(c)//': has no name')
-      if (any(name(:c - 1) == name(c)) .and. len_trim(word) > 0) call problems%add_message('line ' &
-        //to_text(line)//', column '//to_text(c)//' ('//printable(trim(word)) &
-        //'): is there twice')
-    end do
-    table%name = name
+    deallocate (table%name)
+    allocate (table%name(n))
+    allocate (table%factor(n), source=1.0_wp)
     table%head = line
+    do c = 1, n
+      word = lower_case(table%cell(0, c))//'['
+      table%name(c) = word(:scan(word(2:), '[('))
+      if (len_trim(table%name(c)) == 0) call problems%add_message('line '//to_text(line) &
+        //', column '//to_text(c)//': has no name')
+      if (any(table%name(:c - 1) == table%name(c)) .and. len_trim(table%name(c)) > 0) then
+        call problems%add_message(table%place(0, c)//': is there twice')
+      end if
+    end do
   end subroutine set_names
 
   !> A row, which has a cell for each name.
@@ -215,6 +220,17 @@ contains
     end do
   end function column
 
+  !> Where a cell stands, its column named as the file does; row 0: the name itself.
+  function place(self, row, column) result(text)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: row, column
+    character(:), allocatable :: text
+
+    text = 'line '//to_text(self%head)
+    if (row > 0) text = 'line '//to_text(self%line(row))
+    text = text//', column '//to_text(column)//' ('//printable(self%cell(0, column))//')'
+  end function place
+
   !> Tell what is wrong with a cell.
   subroutine table_report(self, row, column, what, problems)
     class(csv_table_t), intent(in) :: self
@@ -222,8 +238,7 @@ contains
     character(*), intent(in) :: what
     type(problems_t), intent(inout) :: problems
 
-    call problems%add_message('line '//to_text(self%line(row))//', column '//to_text(column) &
-      //' ('//printable(trim(self%name(column)))//') = ' &
+    call problems%add_message(self%place(row, column)//' = ' &
       //quoted_text(printable(self%cell(row, column)))//': '//what)
   end subroutine table_report
 
@@ -259,6 +274,18 @@ contains
     call self%report(row, column, what, problems)
   end subroutine number
 
+  !> Tell of remarks that may be rows.
+  subroutine warn_of_remarks(self, subject, line, warnings)
+    class(csv_table_t), intent(in) :: self
+    character(*), intent(in) :: subject   !! group, variable and value that name the table
+    integer, intent(in) :: line           !! of the case
+    type(problems_t), intent(inout) :: warnings
+
+    if (self%n_doubtful > 0) call warnings%add_message(subject//': remarks look like rows, ' &
+      //to_text(self%n_doubtful)//' in all, the first on line '//to_text(self%doubtful) &
+      //'; a text that begins with # stands in quotes', line)
+  end subroutine warn_of_remarks
+
   !> Call a column by the name that the program has for it, unless there is one of that name.
   subroutine rename(self, from, to)
     class(csv_table_t), intent(inout) :: self
@@ -275,22 +302,22 @@ contains
     character(*), intent(in) :: units(:)      !! of the known ones; empty: none
     integer, intent(in) :: n_required
     type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: list, place
+    character(:), allocatable :: list, word
     integer :: c, k, u
 
     list = ''
     do c = 1, size(self%name)
       if (self%name(c) == '') cycle
-      place = 'line '//to_text(self%head)//', column '//to_text(c)//' (' &
-        //printable(trim(self%name(c)))//')'
       k = findloc(known == self%name(c), .true., 1)
       if (k == 0) then
-        call problems%add_message(place//': unknown, nearest known: ' &
+        call problems%add_message(self%place(0, c)//': unknown, nearest known: ' &
           //nearest_name(trim(self%name(c)), known))
         cycle
       end if
-      if (units(k) == '' .or. self%unit(c) == '') cycle
-      u = findloc(unit == self%unit(c) .and. si == units(k), .true., 1)
+      word = lower_case(self%cell(0, c))
+      word = trim(adjustl(word(scan(word//'[', '[(') + 1:scan(word//']', '])') - 1)))
+      if (units(k) == '' .or. len(word) == 0) cycle
+      u = findloc(unit == word .and. si == units(k), .true., 1)
       if (u > 0) then
         self%factor(c) = factor(u)
         cycle
@@ -299,8 +326,8 @@ contains
       do u = 1, n_units
         if (si(u) == units(k)) list = list//', '//trim(unit(u))
       end do
-      call problems%add_message(place//' = '//quoted_text(printable(trim(self%unit(c)))) &
-        //': no unit that is known here, must be one of '//list(3:))
+      call problems%add_message(self%place(0, c)//': no unit that is known here, must be one of ' &
+        //list(3:))
     end do
     list = ''
     do c = 1, n_required

@@ -25,9 +25,9 @@ module motion_file_m
 contains
 
   !> Read the tables of all bodies that name one; where a body is at its release comes from there.
-  subroutine read_motions(case, problems)
+  subroutine read_motions(case, problems, warnings)
     type(case_t), intent(inout) :: case
-    type(problems_t), intent(inout) :: problems
+    type(problems_t), intent(inout) :: problems, warnings
     type(problems_t) :: found
     type(csv_table_t) :: table
     real(wp), allocatable :: time(:), x(:, :), q(:, :)
@@ -48,6 +48,7 @@ contains
             //'has the &body; give one only')
           if (found%n == 0) call read_rows(table, turns, body%quaternion, time, x, q, found)
         end if
+        call table%warn_of_remarks('&body motion = '//quoted_text(body%motion), body%line, warnings)
         do i = 1, found%n
           call problems%add_message('&body motion = '//quoted_text(body%motion)//': ' &
             //found%message(i), body%line)
@@ -78,7 +79,7 @@ contains
     real(wp), allocatable, intent(out) :: time(:), x(:, :), q(:, :)
     type(problems_t), intent(inout) :: problems
     real(wp) :: row(8), angle
-    logical :: ok, good(table%n_rows)
+    logical :: ok
     integer :: r, c, last
 
     allocate (time(table%n_rows), x(3, table%n_rows), q(4, table%n_rows), source=0.0_wp)
@@ -96,14 +97,12 @@ contains
       do c = 1, merge(size(columns), n_required, turns)
         call table%number(r, table%column(columns(c)), .true., row(c), ok, problems)
       end do
-      good(r) = ok
       if (.not. ok) cycle
       time(r) = row(1)
       x(:, r) = row(2:4)
       q(:, r) = row(5:8)
       if (.not. norm(q(:, r)) > 0.0_wp) then
         call table%report(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', problems)
-        good(r) = .false.
         cycle
       end if
       q(:, r) = normalised(q(:, r))

@@ -35,9 +35,9 @@ module placing_table_m
 contains
 
   !> Read the tables of all drops; every problem is reported with file, line and column.
-  subroutine read_places(case, problems)
+  subroutine read_places(case, problems, warnings)
     type(case_t), intent(inout) :: case
-    type(problems_t), intent(inout) :: problems
+    type(problems_t), intent(inout) :: problems, warnings
     type(problems_t) :: found
     integer :: i, k
 
@@ -47,7 +47,7 @@ contains
         if (len_trim(drop%file) == 0) cycle
         found = problems_t()
         call read_drop([case%shape%name, (member_name(case%shape(k), case%shape(k)%member), &
-          k=1, size(case%shape))], drop, found)
+          k=1, size(case%shape))], drop, found, warnings)
         drop%faulty = drop%faulty .or. found%n > 0
         do k = 1, min(found%n, max_reported)
           call problems%add_message('&drop file = '//quoted_text(drop%file)//': ' &
@@ -61,11 +61,12 @@ contains
   end subroutine read_places
 
   !> The table of one drop.
-  subroutine read_drop(shapes, drop, problems)
+  subroutine read_drop(shapes, drop, problems, warnings)
     character(name_length), intent(in) :: shapes(:)
     type(drop_input_t), intent(inout) :: drop
-    type(problems_t), intent(inout) :: problems
+    type(problems_t), intent(inout) :: problems, warnings
     type(csv_table_t) :: table
+    character(120), allocatable :: pose(:)
     integer :: column(size(known)), r, k
 
     call read_table(found_file(drop%file), table, problems)
@@ -93,7 +94,41 @@ contains
     do r = 1, table%n_rows
       call read_row(table, r, column, shapes, drop, problems)
     end do
+    call table%warn_of_remarks('&drop file = '//quoted_text(drop%file), drop%line, warnings)
+    if (problems%n > 0) return
+    allocate (pose(table%n_rows))
+    do r = 1, table%n_rows
+      pose(r) = to_text([drop%row(r)%x, drop%row(r)%time])
+    end do
+    call warn_of_twins(table, pose, 'place and time', drop, warnings)
+    call warn_of_twins(table, drop%row%name, 'the name', drop, warnings)
   end subroutine read_drop
+
+  !> Tell of rows that say the same of their unit as one of the rows before them.
+  subroutine warn_of_twins(table, word, what, drop, warnings)
+    type(csv_table_t), intent(in) :: table
+    character(*), intent(in) :: word(:)   !! (rows); empty: the same as none
+    character(*), intent(in) :: what      !! it says of the unit
+    type(drop_input_t), intent(in) :: drop
+    type(problems_t), intent(inout) :: warnings
+    integer, parameter :: looked_at = 10000   ! rows before
+    integer :: r, k, n, last, twin
+
+    n = 0
+    do r = 2, size(word)
+      if (word(r) == '') cycle
+      k = max(1, r - looked_at)
+      k = k - 1 + findloc(word(k:r - 1), word(r), 1)
+      if (k < max(1, r - looked_at)) cycle
+      n = n + 1
+      last = table%line(r)
+      twin = table%line(k)
+    end do
+    if (n > 0) call warnings%add_message('&drop file = '//quoted_text(drop%file)//': ' &
+      //to_text(n)//' of '//to_text(size(word))//' rows have '//what//' of an earlier one, as ' &
+      //'line '//to_text(last)//' that of line '//to_text(twin)//'; is a unit there twice?', &
+      drop%line)
+  end subroutine warn_of_twins
 
   !> One row; what is wrong with it keeps its default.
   subroutine read_row(table, r, column, shapes, drop, problems)

@@ -15,6 +15,7 @@ module case_check_m
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
   use start_bodies_m, only: with_begun
+  use given_motion_m, only: pose_at, fastest_between
   use bed_m, only: bed_t
   use neighbours_m, only: pair_list_t, sort_bodies, add_neighbours
   use scene_m, only: scene_t, set_scene, subject, held_text, near, is_free_beside, pair_depth, &
@@ -77,7 +78,7 @@ contains
     type(scene_t) :: scene
     type(case_t) :: known   ! the case without the sides that are wrong
     character(:), allocatable :: where_to
-    integer :: b, i
+    integer :: b, i, n
 
     known = with_begun(case)
     where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
@@ -92,7 +93,9 @@ contains
         //to_text(scene%blocks%x(:, b))//': '//where_to//'; a body must lie inside the tank', &
         scene%line(b))
     end do
+    n = problems%n
     call check_pairs(known, scene, problems)
+    if (problems%n == n .and. .not. case%grid%extent_faulty) call check_ways(known, scene, problems)
     if (case%grid%extent_faulty) return
     do i = 1, size(case%drop)
       if (.not. case%drop(i)%faulty) call check_drop(known, i, scene, problems)
@@ -221,6 +224,59 @@ contains
       call problems%add_message('&body: '//more)
     end if
   end subroutine check_pairs
+
+  !> A body that a table moves stays in the tank, above the bed and apart from other fixed bodies;
+  !! the first time that it does not is told.
+  subroutine check_ways(case, scene, problems)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(inout) :: scene
+    type(problems_t), intent(inout) :: problems
+    real(wp), parameter :: part = 0.02_wp, shortest = 0.0005_wp
+      !! steps: of the radius of the fastest body and of the time until the end, of the latter [-]
+    character(:), allocatable :: trouble
+    logical, allocatable :: told(:)
+    real(wp) :: t, end, step, depth, v(3), omega(3), fastest(2)
+    integer :: a, b
+
+    associate (blocks => scene%blocks, path => scene%blocks%path(:scene%n))
+      allocate (told(scene%n), source=scene%outside .or. path%n == 0)
+      end = 0.0_wp
+      do b = 1, scene%n
+        if (.not. told(b)) end = max(end, min(case%run%t_end, path(b)%time(path(b)%n)))
+      end do
+      t = 0.0_wp
+      do while (.not. all(told))
+        step = part*end
+        do b = 1, scene%n
+          if (path(b)%n == 0) cycle
+          call pose_at(path(b), t, blocks%x(:, b), blocks%q(:, b), v, omega)
+          fastest = fastest_between(path(b), t, t + part*end)
+          associate (radius => blocks%shapes(blocks%shape(b))%radius)
+            step = min(step, part*radius/max(fastest(1) + radius*fastest(2), tiny(step)))
+          end associate
+        end do
+        do b = 1, scene%n
+          if (told(b) .or. blocks%release_time(b) > t) cycle
+          trouble = way_out(case, scene, b)
+          do a = 1, scene%n
+            if (len(trouble) > 0) exit
+            if (a == b .or. .not. scene%dated(a) .or. blocks%release_time(a) > t) cycle
+            if (.not. scene%held(a) .and. path(a)%n == 0) cycle
+            depth = pair_depth(scene, a, b)
+            if (depth > 0.0_wp) trouble = 'reaches '//brief(depth, 3)//' m into the ' &
+              //held_text(case, scene, a)
+          end do
+          told(b) = len(trouble) > 0
+          if (told(b)) call problems%add_message('&body motion = '//quoted_text(trim(case%body( &
+            findloc(case%body%line, scene%line(b), 1))%motion))//': at '//brief(t, 3)//' s it ' &
+            //trouble//'; a moved body stays inside the tank and apart from fixed bodies', &
+            scene%line(b))
+        end do
+        if (t >= end) exit
+        t = min(end, t + max(step, shortest*end))
+      end do
+    end associate
+  end subroutine check_ways
 
   !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose
   !! place lies in a wall or a held body could wait for ever, so it is a problem now. One that is

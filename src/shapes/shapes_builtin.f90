@@ -204,7 +204,7 @@ contains
     type(shape_t), intent(inout) :: shape
     integer, parameter :: single(1, 1, 1) = 1
     type(line_t) :: line(3)
-    real(wp) :: bar(3)
+    real(wp) :: bar(3), edge
     integer :: r, d
 
     r = input%refinement
@@ -222,8 +222,12 @@ contains
         end do
         call build_cuboids(single, line, shape)
       case ('box')
+        edge = minval(size)   ! of the cuboids, longer in a plate that would have too many
+        do while (product(max(1.0_wp, anint(size/edge))) > max_cuboids/real(r, wp)**3)
+          edge = 2*edge
+        end do
         do d = 1, 3
-          line(d) = line_of(size(d:d), [r*max(1, nint(size(d)/minval(size)))])
+          line(d) = line_of(size(d:d), [r*max(1, nint(size(d)/edge))])
         end do
         call build_cuboids(single, line, shape)
         shape%smallest_edge = minval(size)
@@ -255,7 +259,7 @@ contains
   pure function problem_with(input) result(message)
     type(shape_input_t), intent(in) :: input
     character(:), allocatable :: message
-    real(wp) :: parts, most
+    real(wp) :: most
 
     message = ''
     select case (trim(input%kind))
@@ -271,21 +275,12 @@ contains
       message = 'refinement must be 1 to 8'
     end if
     if (len(message) > 0) return
-    ! the proportions of a box or a cylinder say how finely it is cut
-    select case (trim(input%kind))
-    case ('box')
-      parts = product(anint(input%size/minval(input%size)))
-      most = max_cuboids/real(input%refinement, wp)**3
-      if (parts > most) message = given_size(input)//': so slender a box would be cut into ' &
-        //to_text(parts)//' cubes, at most '//to_text(nint(most))//' with refinement = ' &
-        //to_text(input%refinement)
-    case ('cylinder')
+    if (input%kind == 'cylinder') then   ! its proportions say how finely it is cut
       most = aint(max_slender/sqrt(real(input%refinement, wp)))
       if (input%size(2) > most*input%size(1)) message = given_size(input)//': so slender a ' &
         //'cylinder would be cut too finely, its height must be at most '//to_text(nint(most)) &
         //' diameters with refinement = '//to_text(input%refinement)
-    case default   ! of given proportions, or measured when it is made
-    end select
+    end if
   end function problem_with
 
   !> What says how large a block is, as the case may have it: `size = 1, 2`, `file = 'stone'`.
