@@ -6,7 +6,6 @@ The exit code is 0 whatever is seen: these are observations of one chaotic pile,
 """
 
 from micstools.cli import script
-from micstools.commands import pile
 
 if __name__ == "__main__":
-    script(__doc__, pile.arguments, pile.findings)
+    script("check_pile", __doc__)

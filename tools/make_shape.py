@@ -6,7 +6,6 @@ Exit code 2 and a message for a surface that cannot become a block.
 """
 
 from micstools.cli import script
-from micstools.commands import shape
 
 if __name__ == "__main__":
-    script(__doc__, shape.arguments, shape.make)
+    script("make_shape", __doc__)

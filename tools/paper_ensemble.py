@@ -5,7 +5,6 @@ usage: python tools/paper_ensemble.py [--runs 50] [--moves 20] [--jobs 2] [--out
 """
 
 from micstools.cli import script
-from micstools.commands import paper
 
 if __name__ == "__main__":
-    script(__doc__, paper.arguments, paper.work)
+    script("paper_ensemble", __doc__)

@@ -4,7 +4,6 @@ usage: python tools/plot_history.py RUN [--out FILE]
 """
 
 from micstools.cli import script
-from micstools.commands import plot
 
 if __name__ == "__main__":
-    script(__doc__, plot.history_arguments, plot.draw_history)
+    script("plot_history", __doc__)

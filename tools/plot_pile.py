@@ -4,7 +4,6 @@ usage: python tools/plot_pile.py RUN [--times 0.2 0.5 ...] [--view front side] [
 """
 
 from micstools.cli import script
-from micstools.commands import plot
 
 if __name__ == "__main__":
-    script(__doc__, plot.picture_arguments, plot.draw_pictures)
+    script("plot_pile", __doc__)

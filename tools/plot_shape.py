@@ -4,7 +4,6 @@ usage: python tools/plot_shape.py hexapod|cube|RUN [--shape NAME] [--out FILE]
 """
 
 from micstools.cli import script
-from micstools.commands import shape
 
 if __name__ == "__main__":
-    script(__doc__, shape.picture_arguments, shape.draw)
+    script("plot_shape", __doc__)

@@ -1,48 +1,18 @@
 """`mics-tools`: every tool under one name, `mics-tools COMMAND --help` tells each."""
 
-import argparse
 import sys
-from collections.abc import Callable
-from importlib import import_module
 
 from micstools import command
-from micstools.commands.base import Command, Parser
+from micstools.commands.base import COMMANDS, Parser
 
-# Where each command is; only the one that is called is loaded: `--help` draws nothing.
-COMMANDS = {
-    "run": ("run", "RUN", "run a case"),
-    "check": ("check", "CHECK", "check a case: its plan in words, or as a page"),
-    "watch": ("watch", "WATCH", "watch a run or an ensemble while it goes on, on a page"),
-    "studio": ("studio", "STUDIO", "edit, check, run and watch a case on a page"),
-    "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
-    "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
-    "places": ("places", "PLACES", "write where units lie: csv, geojson, dxf"),
-    "report": ("report", "REPORT", "make one page of a run or an ensemble"),
-    "export": ("export", "EXPORT", "write a run for other programs: glb, stl, obj, csv, pvd"),
-    "movie": ("movie", "MOVIE", "make a film of a run: mp4 or gif"),
-    "compare": ("compare", "COMPARE", "put two runs beside each other"),
-    "study": ("study", "STUDY", "run a case on coarser and finer cells"),
-    "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
-    "shape": ("shape", "SHAPE", "make a block from a drawing"),
-    "bed": ("bed", "BED", "make a bed from a map of measured ground"),
-    "calibrate": ("calibrate", "CALIBRATE", "fit the drag of a shape for light runs"),
-    "harbour": ("harbour", "HARBOUR", "write the case of a breakwater of many blocks"),
-}
 _SUMMARY = "Run cases of mics, look at the results, make blocks and beds."
 
 
 def usage() -> str:
     """All commands, a line each."""
-    lines = [f"  {name:10}{summary}" for name, (_, _, summary) in COMMANDS.items()]
+    lines = [f"  {name:10}{about['line']}" for name, about in COMMANDS.items()]
     text = "usage: mics-tools COMMAND ...\n\n" + _SUMMARY + "\n\n" + "\n".join(lines)
     return text + "\n\nmics-tools COMMAND --help tells the options, with examples."
-
-
-def find(name: str) -> Command:
-    """A command by its name."""
-    module, constant, _ = COMMANDS[name]
-    found: Command = getattr(import_module(f"micstools.commands.{module}"), constant)
-    return found
 
 
 def main(words: list[str] | None = None) -> None:
@@ -57,26 +27,12 @@ def main(words: list[str] | None = None) -> None:
             file=sys.stderr,
         )
         raise SystemExit(2)
-    chosen = find(words[0])
-    parser = Parser(
-        prog=f"mics-tools {chosen.name}",
-        description=chosen.summary,
-        epilog=chosen.epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    chosen.arguments(parser)
-    command.run_script(lambda: _finish(chosen.work(parser.parse_args(words[1:]))), parser.prog)
+    command.run_script(lambda: _finish(Parser(words[0]).call(words[1:])), f"mics-tools {words[0]}")
 
 
-def script(
-    doc: str,
-    arguments: Callable[[argparse.ArgumentParser], None],
-    work: Callable[[argparse.Namespace], int],
-) -> None:
+def script(name: str, doc: str) -> None:
     """A script of `tools` that does a part of a command."""
-    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
-    arguments(parser)
-    command.run_script(lambda: _finish(work(parser.parse_args())))
+    command.run_script(lambda: _finish(Parser(name, doc.splitlines()[0]).call()))
 
 
 def _finish(code: int) -> None:

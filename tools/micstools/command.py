@@ -13,7 +13,6 @@ from micstools.reading.reader import BadRun, Run
 
 OUTPUT = "mics-out"
 """Folder of a case that names none."""
-RUN_HELP = "output folder of a run, or its case file"
 
 
 def results_of(path: Path) -> Path:

@@ -24,7 +24,11 @@ def write(path: Path, text: str) -> None:
             _put(file, content)
         if old is None or _stands_for(new, place, old):
             new.replace(place)
-            _settle(place.parent)
+            # Let the new name outlive a power cut
+            entry = os.open(place.parent, os.O_RDONLY)
+            with contextlib.suppress(OSError):  # some file systems settle no folder
+                os.fsync(entry)
+            os.close(entry)
             return
     except PermissionError:
         if old is None:
@@ -33,14 +37,6 @@ def write(path: Path, text: str) -> None:
         new.unlink(missing_ok=True)
     with place.open("r+b") as file:
         _put(file, content)
-
-
-def _settle(folder: Path) -> None:
-    """Let the new name outlive a power cut."""
-    entry = os.open(folder, os.O_RDONLY)
-    with contextlib.suppress(OSError):  # some file systems settle no folder
-        os.fsync(entry)
-    os.close(entry)
 
 
 def _mode(old: os.stat_result | None) -> int:

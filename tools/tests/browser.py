@@ -97,7 +97,15 @@ class Browser:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
                 return answer.get("result", {})
-            self._note(answer)
+            kind, said = answer.get("method", ""), answer.get("params", {})
+            if kind == "Runtime.exceptionThrown":
+                self.errors.append(json.dumps(said["exceptionDetails"])[:2000])
+            elif kind == "Runtime.consoleAPICalled" and said["type"] in ("error", "warning"):
+                self.errors.append(json.dumps(said["args"])[:2000])
+            elif kind == "Log.entryAdded" and said["entry"]["level"] in ("error", "warning"):
+                self.errors.append(said["entry"]["text"])
+            elif kind == "Network.requestWillBeSent":
+                self.requests.append(said["request"]["url"][:200])
 
     def _next(self) -> dict[str, Any]:
         while b"\0" not in self.rest:
@@ -109,17 +117,6 @@ class Browser:
         message, self.rest = self.rest.split(b"\0", 1)
         found: dict[str, Any] = json.loads(message)
         return found
-
-    def _note(self, event: dict[str, Any]) -> None:
-        kind, said = event.get("method", ""), event.get("params", {})
-        if kind == "Runtime.exceptionThrown":
-            self.errors.append(json.dumps(said["exceptionDetails"])[:2000])
-        elif kind == "Runtime.consoleAPICalled" and said["type"] in ("error", "warning"):
-            self.errors.append(json.dumps(said["args"])[:2000])
-        elif kind == "Log.entryAdded" and said["entry"]["level"] in ("error", "warning"):
-            self.errors.append(said["entry"]["text"])
-        elif kind == "Network.requestWillBeSent":
-            self.requests.append(said["request"]["url"][:200])
 
     def open(self, page: Path, width: int = 1100, height: int = 800, dark: bool = False) -> None:
         """Open a file in a window of a size."""

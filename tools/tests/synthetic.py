@@ -74,7 +74,11 @@ def write_run(folder: Path, motion: Motion | None = None) -> Path:
         _write_provenance(h5, motion)
         for axis, n, length in zip("xyz", motion.cells, TANK, strict=True):
             h5[f"grid/{axis}"] = np.linspace(0, length, n + 1)
-        _write_shape(h5.create_group(f"shapes/{motion.shape.name}"), motion.shape)
+        group = h5.create_group(f"shapes/{motion.shape.name}")
+        for name in ("points", "triangles", "tets", "sphere_centre", "sphere_radius"):
+            group[name] = getattr(motion.shape, name)
+        for name in ("volume", "inertia", "density"):
+            group.attrs[name] = getattr(motion.shape, name)
         _write_bodies(h5.create_group("bodies"), motion, time, position, quaternion, touching)
         _write_series(h5.create_group("series"), time, len(motion.places))
     _write_fields(folder / "fields.vtkhdf", motion, time, position, quaternion)
@@ -165,13 +169,6 @@ def _write_provenance(h5: h5py.File, motion: Motion) -> None:
             "exit_status": 0,
         }
     )
-
-
-def _write_shape(group: h5py.Group, shape: Shape) -> None:
-    for name in ("points", "triangles", "tets", "sphere_centre", "sphere_radius"):
-        group[name] = getattr(shape, name)
-    for name in ("volume", "inertia", "density"):
-        group.attrs[name] = getattr(shape, name)
 
 
 def _write_bodies(

@@ -338,7 +338,7 @@ def test_what_is_no_map_is_one_line(
     ("words", "said"),
     [
         (["--origin", "1,2"], "--origin 1,2: must be X,Y,Z"),
-        (["--scale", "0"], "--scale 0: must be positive"),
+        (["--scale", "0"], "--scale 0.0: must be positive"),
         (["--grid", "1"], "is for scattered points"),
         (["--window", "101,201,99,202"], "the lower corner first"),
         (["--window", "101,201,109,202"], "covers x 101 to 107 and y 201 to 205 m only"),

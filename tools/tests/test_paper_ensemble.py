@@ -87,7 +87,7 @@ def test_runs_what_is_missing_and_writes_the_table(
     monkeypatch.setattr("sys.argv", words)
     for left in ("2 of them to do", "0 of them to do"):
         with pytest.raises(SystemExit) as end:
-            script("Once more.", paper.arguments, paper.work)
+            script("paper_ensemble", "Once more.")
         assert end.value.code == 0
         assert left in capsys.readouterr().out
     with (out / "shares.csv").open() as file:

@@ -1,7 +1,6 @@
 """README, guide, gallery, architecture and all other texts: what they show works, what they name
 is there, stages, versions and constants are those of the sources, links of built pages are good."""
 
-import argparse
 import os
 import re
 import subprocess
@@ -15,6 +14,7 @@ from doc_pages import IN_SITE, Links, Page, pages, with_links
 from fences import fences
 from micstools import cli
 from micstools.cases import settings
+from micstools.commands.base import Parser
 from micstools.reading.reader import Run
 from packages import HEIGHT, TOP
 
@@ -150,9 +150,7 @@ def test_every_tool_and_option_named_is_there(page: str) -> None:
     assert calls
     for name, words in calls:
         assert name in cli.COMMANDS, name
-        parser = argparse.ArgumentParser()
-        cli.find(name).arguments(parser)
-        known = {option for action in parser._actions for option in action.option_strings}
+        known = Parser(name)._option_string_actions
         for option in re.findall(r"--[a-z-]+", words):
             assert option in known, f"mics-tools {name} {option}"
 

@@ -151,19 +151,15 @@ def initial_state(rng: random.Random, odd: bool = False) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "state.h5"
         with h5py.File(path, "w", libver=rng.choice(["earliest", "latest"])) as h5:
-            write_state(h5, rng)
+            # A good state, plain, in chunks or compressed
+            options: dict[str, object] = rng.choice([{}, {"chunks": True}, {"compression": "gzip"}])
+            shares = np.random.default_rng(rng.randrange(1 << 30)).random((5, 4, 6))
+            h5.create_dataset("liquid", data=shares, **options)
+            if rng.random() < 0.5:
+                h5.create_dataset("velocity", data=0.01 * np.ones((5, 4, 6, 3)), **options)
             if odd:
                 odd_state(h5, rng)
         return path.read_bytes()
-
-
-def write_state(h5: h5py.File, rng: random.Random) -> None:
-    """A good state, plain, in chunks or compressed."""
-    options: dict[str, object] = rng.choice([{}, {"chunks": True}, {"compression": "gzip"}])
-    shares = np.random.default_rng(rng.randrange(1 << 30)).random((5, 4, 6))
-    h5.create_dataset("liquid", data=shares, **options)
-    if rng.random() < 0.5:
-        h5.create_dataset("velocity", data=0.01 * np.ones((5, 4, 6, 3)), **options)
 
 
 def odd_state(h5: h5py.File, rng: random.Random) -> None:
@@ -291,23 +287,19 @@ def damaged_text(data: bytes, rng: random.Random) -> bytes:
         case 6:
             return b" ".join(rows)
         case _:
-            return with_other_word(data, rng)
+            # One word, a number if possible, becomes another
+            words = list(re.finditer(rb"[^\s]+", data))
+            numbers = [w for w in words if re.fullmatch(rb"[-+.\deE]+", w[0])]
+            if not words:
+                return data
+            word = rng.choice(numbers if numbers and rng.random() < 0.9 else words)
+            new = rng.choice(NASTY).encode("latin-1")
+            if rng.random() < 0.2:
+                new = rng.choice(words)[0]
+            if rng.random() < 0.2 and re.fullmatch(rb"\d+", word[0]):
+                new = b"%d" % max(0, int(word[0]) + rng.choice([-1, 1]))
+            return data[: word.start()] + new + data[word.end() :]
     return b"\n".join(rows)
-
-
-def with_other_word(data: bytes, rng: random.Random) -> bytes:
-    """One word, a number if possible, becomes another."""
-    words = list(re.finditer(rb"[^\s]+", data))
-    numbers = [w for w in words if re.fullmatch(rb"[-+.\deE]+", w[0])]
-    if not words:
-        return data
-    word = rng.choice(numbers if numbers and rng.random() < 0.9 else words)
-    new = rng.choice(NASTY).encode("latin-1")
-    if rng.random() < 0.2:
-        new = rng.choice(words)[0]
-    if rng.random() < 0.2 and re.fullmatch(rb"\d+", word[0]):
-        new = b"%d" % max(0, int(word[0]) + rng.choice([-1, 1]))
-    return data[: word.start()] + new + data[word.end() :]
 
 
 def damaged_bytes(data: bytes, rng: random.Random, number: str) -> bytes:

@@ -47,17 +47,6 @@ def second_run(shop: Shop, way: str, folder: Path, work: Path) -> subprocess.Pop
     return shop.start(*words, **({"env": elsewhere(work)} if way.startswith("unseen") else {}))
 
 
-def disturb(way: str, folder: Path, kept: Path) -> None:
-    """Do to the folder what comes before a second run."""
-    if way == "deleted":
-        while folder.exists():  # the run may write a file meanwhile
-            shutil.rmtree(folder, ignore_errors=True)
-    elif not way.startswith("unseen"):
-        folder.rename(kept)
-    if way == "emptied":
-        folder.mkdir()
-
-
 def begun(folder: Path, work: Path, way: str) -> bool:
     """Has the second run its files, or what there is of the first?"""
     if way == "unseen in place":
@@ -100,7 +89,14 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
     for pid in still:  # whatever it was about to do comes when the other is at work
         os.kill(pid, signal.SIGSTOP)
     rows, whole = (len(column(path, "series/wall_time")) for path in (folder, shop.whole))
-    disturb(way, folder, kept)
+    # Do to the folder what comes before a second run
+    if way == "deleted":
+        while folder.exists():  # the run may write a file meanwhile
+            shutil.rmtree(folder, ignore_errors=True)
+    elif not way.startswith("unseen"):
+        folder.rename(kept)
+    if way == "emptied":
+        folder.mkdir()
     second = second_run(shop, way, folder, work) if way in SECOND else None
     while second and second.poll() is None and not begun(folder, work, way):
         time.sleep(0.001)

@@ -12,7 +12,6 @@ Groups and variables, with units, defaults and meanings, are those of the schema
 prints: `help(case.run)`, `case.drop[0].about("spread")`.
 """
 
-import argparse
 import difflib
 import html
 import subprocess
@@ -51,7 +50,13 @@ class _Variable:
     def __init__(self, group: str, name: str) -> None:
         about = variables(group)[name]
         self.name, self.default = name, about.get("default")
-        self.__doc__ = _describe(about)
+        # Meaning, unit, values and default of a variable in a line
+        said = str(about["description"])
+        if "enum" in about:
+            said += f"; {', '.join(repr(v) for v in about['enum'])}"
+        if "default" in about:
+            said += f"; default {about['default']!r}"
+        self.__doc__ = said
 
     def __get__(self, group: "Group | None", owner: type) -> Any:
         """What the case gives, else the default; None where there is none."""
@@ -64,16 +69,6 @@ class _Variable:
     def __delete__(self, group: "Group") -> None:
         """Go back to the default."""
         group.given.pop(self.name, None)
-
-
-def _describe(about: dict[str, Any]) -> str:
-    """Meaning, unit, values and default of a variable in a line."""
-    said = str(about["description"])
-    if "enum" in about:
-        said += f"; {', '.join(repr(v) for v in about['enum'])}"
-    if "default" in about:
-        said += f"; default {about['default']!r}"
-    return said
 
 
 class Group:
@@ -273,13 +268,11 @@ class Case:
 
         `vary`: values by variable, as {"contact.friction": [0.4, 0.6]}; `options`: seed, spread
         [m], tilt [degrees], keep_fields. A second call with the same `out` runs what is missing."""
-        from micstools.commands.ensemble import ENSEMBLE
+        from micstools.commands.base import Parser
 
         if threading.current_thread() is not threading.main_thread():
             raise BadRun("an ensemble is started from the main thread")
         folder = Path(out)
-        parser = argparse.ArgumentParser()
-        ENSEMBLE.arguments(parser)
         words = ["--runs", str(runs), "--out", str(folder), "--program", str(self._program(mics))]
         words += ["--jobs", str(jobs)] if jobs else []
         for name, values in (vary or {}).items():
@@ -288,7 +281,7 @@ class Case:
             words += [f"--{name.replace('_', '-')}", str(value)]
         case = folder.with_name(f"{folder.name}.nml")
         files.write(case, self._here())
-        code = ENSEMBLE.work(parser.parse_args([str(case), *words]))
+        code = Parser("ensemble").call([str(case), *words])
         if code:
             raise BadRun(f"{folder}: not all runs came to their end (code {code})")
         return Ensemble(folder)

@@ -1,6 +1,5 @@
 """The program `mics` and the case handed to it."""
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -10,9 +9,6 @@ from pathlib import Path
 from micstools.cases import case_copy, settings
 from micstools.reading.reader import BadRun
 
-CASE_HELP = "case file"
-PROGRAM_HELP = """default: that of the environment variable MICS, else the mics that make has built,
-on the PATH, beside the case or in the folder above it"""
 VARIABLE = "MICS"
 """Environment variable that names the program."""
 BUILT = Path(__file__).parents[3] / "mics"
@@ -44,21 +40,6 @@ def _named(name: str, words: str) -> Path:
     if found is None:
         raise BadRun(f"{words}: is no program")
     return Path(found).resolve()
-
-
-def add_case(parser: argparse.ArgumentParser) -> None:
-    """The arguments of every command that takes a case."""
-    parser.add_argument("case", type=Path, help=CASE_HELP)
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="settings",
-        metavar="GROUP.VARIABLE=VALUE",
-        help="set a variable of the case, as often as wanted; in each group of a repeated name; "
-        "with several &drop, drop.seed=7 gives them the seeds 7, 8, ...",
-    )
-    parser.add_argument("--program", type=Path, help=PROGRAM_HELP)
 
 
 def case_text(case: Path, words: list[str]) -> str:

@@ -1,26 +1,19 @@
 """Two runs beside each other."""
 
 import argparse
-from pathlib import Path
 
 from micstools import command
-from micstools.commands.base import Command
 from micstools.piles import maps, pile_ensemble, pile_numbers
 from micstools.reading import comparison, units
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    for name in ("one", "two"):
-        parser.add_argument(name, type=Path, help=command.RUN_HELP)
-
-
 def _numbers(run: Run) -> dict[str, float | str]:
     return pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run)))
 
 
-def _compare(given: argparse.Namespace) -> int:
+def work(given: argparse.Namespace) -> int:
     one, two = command.open_run(given.one), command.open_run(given.two)
     for run in (one, two):
         if not run.bodies.n:
@@ -52,13 +45,3 @@ def _row(chosen: Units, name: str, one: float | str, two: float | str) -> tuple[
     unit = pile_numbers.unit(chosen, name)
     a, b = ("-" if v == "" else unit.plain(float(v), 6) for v in (one, two))
     return name, a, b
-
-
-COMPARE = Command(
-    "compare",
-    "Put two runs beside each other: in what their cases differ, the numbers of both piles, when\n"
-    "each block parts from its twin (by a hundredth of its size) and how far apart they end.",
-    ("compare mics-coarse mics-7",),
-    _arguments,
-    _compare,
-)

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from micstools.cases import program, settings
-from micstools.commands.base import Command
 from micstools.ensembles import (
     ensemble,
     ensemble_engine,
@@ -30,31 +29,7 @@ STOPPED = 130
 """Exit code after Ctrl-C."""
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    program.add_case(parser)
-    add = parser.add_argument
-    add("--runs", type=int, required=True, help="number of runs, of each choice of --vary")
-    add("--jobs", type=int, default=os.cpu_count() or 1, help="at once, one core each")
-    add("--seed", type=int, default=1, help="the seeds of all runs follow from it, default 1")
-    add("--spread", type=float, help="random shift of each drop in x and y, up to +- this [m]")
-    add("--tilt", type=float, help="random tilt of each drop up to this [degrees]")
-    add("--vary", action="append", default=[], metavar="GROUP.VARIABLE=A,B",
-        help="runs for each value, with the same seeds; several: every combination")  # fmt: skip
-    add("--keep-fields", metavar="RUNS", help="median, or numbers as in 3,7: run these once more "
-        "with the fields of the water, in DIR/NNNN/fields; median: of the tops")  # fmt: skip
-    add("--out", type=Path, help="folder, default mics-ensemble-CASE")
-    add("--slurm", nargs="*", metavar="OPTION", help="write a Slurm array script instead of "
-        "running, with options of sbatch such as time=2:00:00")  # fmt: skip
-    add("--cluster", nargs="+", metavar="WORD", help="slurm or pbs: let its queue start --jobs "
-        "workers, with NAME=VALUE for each job: " + ", ".join(ensemble_queue.OPTIONS)
-        + "; this call waits for them")  # fmt: skip
-
-
 def _plan(given: argparse.Namespace) -> Plan:
-    for name, least in (("runs", 1), ("jobs", 1), ("seed", 0), ("spread", 0), ("tilt", 0)):
-        value = getattr(given, name)
-        if value is not None and not value >= least:
-            raise BadRun(f"--{name} {value}: must be {least} or more")
     text = program.case_text(given.case, given.settings)
     choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
     folder = given.out or Path(f"mics-ensemble-{given.case.stem}")
@@ -72,13 +47,6 @@ def _differ(plan: Plan, members: list[Member]) -> None:
     )
     if plan.runs > 1 and not chance:
         raise BadRun("nothing is left to chance in this case: give --spread or --tilt")
-
-
-def _cost(program_path: Path, plan: Plan, members: list[Member]) -> str:
-    """Check the first run of each choice and say what one takes."""
-    said = [program.check(program_path, m.text) for m in members[: len(plan.choices)]]
-    found = re.search(r"time of the run\s+(.*)", said[0])
-    return found[1] if found else "unknown"
 
 
 @contextlib.contextmanager
@@ -136,12 +104,18 @@ def _terminated(signum: int, _frame: object) -> NoReturn:
     raise KeyboardInterrupt(signum)
 
 
-def _ensemble(given: argparse.Namespace) -> int:
-    plan, engine = _plan(given), _engine(given)
+def work(given: argparse.Namespace) -> int:
+    queue = ensemble_queue.parse(given.cluster) if given.cluster else None
+    if queue and given.slurm is not None:
+        raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
+    plan, engine = _plan(given), Engine(program.find(given.program, given.case), given.jobs, queue)
     members = list(ensemble.members(plan))
     _differ(plan, members)
     wanted, again = _kept(given, plan, len(members))
-    cost = _cost(engine.program, plan, members)
+    # check the first run of each choice and say what one takes
+    said = [program.check(engine.program, m.text) for m in members[: len(plan.choices)]]
+    found = re.search(r"time of the run\s+(.*)", said[0])
+    cost = found[1] if found else "unknown"
     with _alone(plan.folder):
         for member in members:
             ensemble.write_case(member)
@@ -158,13 +132,6 @@ def _ensemble(given: argparse.Namespace) -> int:
             return code
         numbers = wanted or ensemble_fields.medians(table)
         return max(code, _run_again([again[number - 1] for number in numbers], engine))
-
-
-def _engine(given: argparse.Namespace) -> Engine:
-    queue = ensemble_queue.parse(given.cluster) if given.cluster else None
-    if queue and given.slurm is not None:
-        raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
-    return Engine(program.find(given.program, given.case), given.jobs, queue)
 
 
 def _kept(
@@ -231,19 +198,3 @@ def _compute(plan: Plan, table: dict[Member, State], waiting: list[Member], engi
         print(f"mics-tools ensemble: failed: {names}; the same command tries again, "
               f"{plan.folder}/{failed[0]:04d}/log.txt tells why", file=sys.stderr)  # fmt: skip
     return 3 if failed else 0
-
-
-ENSEMBLE = Command(
-    "ensemble",
-    "Run a case many times with other random drops; call it again to run what is missing.",
-    (
-        "ensemble input/blocks_coarse.nml --runs 50",
-        "ensemble input/blocks_coarse.nml --runs 20 --spread 0.005 --tilt 5 --jobs 2",
-        "ensemble input/blocks_coarse.nml --runs 50 --keep-fields median",
-        "ensemble input/blocks_coarse.nml --runs 20 --vary contact.friction=0.4,0.6 --out mics-mu",
-        "ensemble input/blocks.nml --runs 50 --slurm time=2:00:00 partition=short",
-        "ensemble input/blocks.nml --runs 50 --jobs 50 --cluster slurm walltime=2:00:00 queue=day",
-    ),
-    _arguments,
-    _ensemble,
-)

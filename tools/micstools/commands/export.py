@@ -2,26 +2,15 @@
 
 import argparse
 import sys
-from pathlib import Path
 
 import numpy as np
 
 from micstools import command, extras
-from micstools.commands.base import Command
 from micstools.pictures import exports
 from micstools.reading.reader import BadRun, Run
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("run", type=Path, help=command.RUN_HELP)
-    add("--to", required=True, metavar="FORMATS", help="of " + ",".join(exports.FORMATS))
-    add("--time", type=float, help="of stl and obj [s], default the end")
-    add("--final", action="store_true", help="csv: only places and attitudes at the end, final.csv")
-    add("--out", type=Path, help="folder for the files, default RUN/export")
-
-
-def _export(given: argparse.Namespace) -> int:
+def work(given: argparse.Namespace) -> int:
     formats = exports.parse_formats(given.to)
     if given.final and "csv" not in formats:
         raise BadRun(f"--final is of csv, which --to {given.to} does not ask for")
@@ -50,18 +39,3 @@ def _tell_left_out(run: Run) -> None:
     missing = [str(k + 1) for k in np.flatnonzero(~run.bodies.present(-1))]
     if missing:
         print(f"left out, not in the tank at the end: {', '.join(missing)}", file=sys.stderr)
-
-
-EXPORT = Command(
-    "export",
-    "Write a run for other programs, in m, a named object per block: the fall (glb), the pile of\n"
-    "one time (stl, obj), each shape (shapes, an STL each), places and attitudes (csv), files for\n"
-    "ParaView before 5.12 (pvd).",
-    (
-        "export mics-coarse --to glb,csv",
-        "export mics-coarse --to csv --final",
-        "export mics-coarse --to stl,obj --time 3 --out /tmp/pile",
-    ),
-    _arguments,
-    _export,
-)

@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 
 from micstools import command, files
-from micstools.commands.base import Command
 from micstools.piles import layer, maps, pile, pile_ensemble, pile_form, pile_numbers, placing
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.piles.placing import Area
@@ -20,12 +19,6 @@ from micstools.reading.reader import BadRun
 from micstools.reading.shares import in_words
 from micstools.reading.units import ascii_of
 from micstools.shapes.geometry import Array
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Which run, and whether the paper's words are put to it."""
-    parser.add_argument("run", type=Path, help=command.RUN_HELP)
-    parser.add_argument("--paper", action="store_true", help="what the paper says, in any tank")
 
 
 def findings(given: argparse.Namespace) -> int:
@@ -37,57 +30,31 @@ def findings(given: argparse.Namespace) -> int:
     return 0
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
-    add("--paper", action="store_true", help="what the paper says, in any tank")
-    add("--step", type=float, help="of plan area and maps [m], default a 300th of the tank")
-    add("--box", type=float, nargs=6, metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
-        help="of the porosity [m], default the box around the pile")  # fmt: skip
-    add_area(parser)
-
-
-def add_area(parser: argparse.ArgumentParser) -> None:
-    """Where blocks should lie, for an ensemble."""
-    parser.add_argument("--area", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
-        help="where blocks should lie [m], of an ensemble; default: around the drops")  # fmt: skip
-
-
 def area_of(values: list[float] | None) -> Area | None:
     """The area that a user gave."""
-    if values is None:
-        return None
-    if not (values[0] < values[2] and values[1] < values[3]):
-        raise BadRun(f"--area {' '.join(map(str, values))}: the first corner must be the lower one")
-    return Area((values[0], values[1]), (values[2], values[3]), True)
+    return Area((values[0], values[1]), (values[2], values[3]), True) if values else None
 
 
-def _pile(given: argparse.Namespace) -> int:
-    if given.step is not None and not given.step > 0:
-        raise BadRun(f"--step {given.step}: must be positive")
+def box_of(values: list[float] | None) -> tuple[Array, Array] | None:
+    """The corners of the box that a user gave."""
+    return (np.array(values[:3]), np.array(values[3:])) if values else None
+
+
+def work(given: argparse.Namespace) -> int:
     if pile_ensemble.is_ensemble(given.run):
         if given.paper:
             raise BadRun("--paper: for one run, not for an ensemble")
-        box, area = _box(given.box), area_of(given.area)
+        box, area = box_of(given.box), area_of(given.area)
         return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area))
     if given.area:
         raise BadRun("--area: for an ensemble, not for one run")
     return _of_run(given)
 
 
-def _box(values: list[float] | None) -> tuple[Array, Array] | None:
-    if values is None:
-        return None
-    low, high = np.array(values[:3]), np.array(values[3:])
-    if not (low < high).all():
-        raise BadRun(f"--box {' '.join(map(str, values))}: the first corner must be the lower one")
-    return low, high
-
-
 def _of_run(given: argparse.Namespace) -> int:
     """Print the findings and the numbers in units by the size of the blocks; in SI units these and
     the outline go into `pile.json`, the height map into `pile_maps.h5`."""
-    box = _box(given.box)
+    box = box_of(given.box)
     findings(given)
     run = command.open_run(given.run)
     step = given.step or maps.usual_step(run)
@@ -176,21 +143,3 @@ def known(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [known(v) for v in value]
     return None if value != value else value
-
-
-PILE = Command(
-    "pile",
-    "Print what a run shows of its pile, with its numbers; these in SI units and its outline\n"
-    "(pile.json) and its height map (pile_maps.h5); or of the piles of an ensemble: where blocks\n"
-    "lie, spread of the numbers (pile.json, pile.csv), maps of the mean pile and of the\n"
-    "probability of cover (pile_maps.h5). Printed units go with the size of the blocks.\n"
-    "The exit code is 0 whatever is seen.",
-    (
-        "pile mics-coarse",
-        "pile mics-coarse --paper",
-        "pile mics-coarse --box 0.05 0 0 0.25 0.1 0.1",
-        "pile mics-ensemble-blocks_coarse",
-    ),
-    _arguments,
-    _pile,
-)

@@ -9,14 +9,13 @@ import numpy as np
 from contourpy import contour_generator
 
 from micstools import command, extras
-from micstools.commands.base import Command
 from micstools.commands.pile import area_of, write_json
 from micstools.piles import handover, layer, pile_ensemble
 from micstools.piles.handover import Handover
 from micstools.piles.layer import Corners
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.reading import places, units
-from micstools.reading.places import Place, Survey
+from micstools.reading.places import Survey
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import ascii_of
 
@@ -25,47 +24,14 @@ CONTOURS = (0.1, 0.5, 0.9)
 """Probabilities of cover that lines are drawn around."""
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
-    add("--to", default="csv", metavar="FORMATS", help="of " + ",".join(FORMATS) + ", default csv")
-    add("--origin", default="0,0,0", metavar="E,N,LEVEL", help="of 0,0,0 of the case in the survey "
-        "[m]; --origin=-5,2,0 with a sign first")  # fmt: skip
-    add("--north", type=float, default=0.0, metavar="DEGREES", help="direction of north in the "
-        "plan, from +y towards +x, default 0")  # fmt: skip
-    add("--crs", metavar="EPSG:CODE", help="of the survey, for geojson")
-    add("--tolerance", type=float, metavar="M", help="of the deviation, default 0.5 D_n50")
-    add("--layers", type=int, metavar="N", help="default: the thickness in D_n, rounded")
-    add("--area", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"), help="of the layer, in "
-        "the tank [m]; default: where it stands above the bed")  # fmt: skip
-    add("--out", type=Path, help="folder for the files, default that of the results")
-
-
-def survey_of(origin: str, north: float) -> Survey:
-    """The coordinates of a survey as a user gives them."""
-    try:
-        east, northing, level = (float(word) for word in origin.split(","))
-    except ValueError:
-        raise BadRun(f"--origin {origin}: must be E,N,LEVEL in m") from None
-    if not np.isfinite([east, northing, level]).all():
-        raise BadRun(f"--origin {origin}: must be E,N,LEVEL in m")
-    if not abs(north) <= 360:
-        raise BadRun(f"--north {north}: must be degrees from -360 to 360")
-    return Survey((east, northing, level), north)
-
-
-def _places(given: argparse.Namespace) -> int:
+def work(given: argparse.Namespace) -> int:
     formats = [word.strip().lower() for word in given.to.split(",")]
     for word in formats:
         if word not in FORMATS:
             raise BadRun(f"--to {given.to}: '{word}' is none of {', '.join(FORMATS)}")
-    survey = survey_of(given.origin, given.north)
+    survey = Survey((*given.origin,), given.north)
     if given.crs:
         handover.crs_name(given.crs)
-    if given.tolerance is not None and not given.tolerance > 0:
-        raise BadRun(f"--tolerance {given.tolerance}: must be positive [m]")
-    if given.layers is not None and given.layers < 1:
-        raise BadRun(f"--layers {given.layers}: must be 1 or more")
     if "asc" in formats and survey.north:
         raise BadRun("--to asc: a raster has its rows along east; with --north there is none")
     if "dxf" in formats:
@@ -100,7 +66,15 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
     maps = measured[0] if measured else None
     handed, shown = Handover(run, survey, found, maps), units.of_run(run)
     about: dict[str, Any] = {"survey": asdict(survey), "columns": places.MEANING}
-    tell_rest(found)
+    # How many units lie still
+    free = [p for p in found if not p.fixed]
+    out = [str(p.unit) for p in free if p.exit_time == p.exit_time]
+    waiting = [str(p.unit) for p in free if p.time != p.time]
+    moving = [str(p.unit) for p in free if p.x == p.x and not p.at_rest]
+    print(f"{len(free)} free units, {sum(p.at_rest for p in free)} of them at rest"
+          + (f"; moving: {some(moving)}" if moving else "")
+          + (f"; out of the tank: {some(out)}" if out else "")
+          + (f"; not released: {some(waiting)}" if waiting else ""))  # fmt: skip
     if measured:
         about["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
         within = places.within(
@@ -129,18 +103,6 @@ def some(numbers: list[str]) -> str:
     """The first ten of them, and how many more."""
     more = len(numbers) - 10
     return ", ".join(numbers[:10]) + (f" and {more} more" if more > 0 else "")
-
-
-def tell_rest(found: list[Place]) -> None:
-    """How many units lie still."""
-    free = [p for p in found if not p.fixed]
-    out = [str(p.unit) for p in free if p.exit_time == p.exit_time]
-    waiting = [str(p.unit) for p in free if p.time != p.time]
-    moving = [str(p.unit) for p in free if p.x == p.x and not p.at_rest]
-    print(f"{len(free)} free units, {sum(p.at_rest for p in free)} of them at rest"
-          + (f"; moving: {some(moving)}" if moving else "")
-          + (f"; out of the tank: {some(out)}" if out else "")
-          + (f"; not released: {some(waiting)}" if waiting else ""))  # fmt: skip
 
 
 def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
@@ -196,21 +158,3 @@ def contours(cover: Any, low: Any, step: float, survey: Survey) -> dict[float, l
         p: [survey.of(low[:2] + (np.asarray(line, float) - 0.5) * step) for line in lines.lines(p)]
         for p in CONTOURS
     }
-
-
-PLACES = Command(
-    "places",
-    "Write where units lie: place, attitude, deviation from the plan, rest and contacts of each\n"
-    "(places.csv), with plans and the outline of the layer (places.geojson, places.dxf); the\n"
-    "surface of the layer, or the probability of cover in an ensemble (places.asc). Thickness,\n"
-    "coefficient, porosity and packing of the layer, with their definitions, go into places.json,\n"
-    "the ellipses in which units of an ensemble land into landings.csv.",
-    (
-        "places mics-coarse",
-        "places mics-coarse --to csv,geojson,dxf --origin 354200,5621080,-12.5 --crs EPSG:25832",
-        "places mics-slope --layers 2 --area 4 2 16 10",
-        "places mics-ensemble-blocks_coarse --to csv,geojson,asc --tolerance 0.5",
-    ),
-    _arguments,
-    _places,
-)

@@ -1,22 +1,11 @@
 """Pictures of the blocks and diagrams of the history of a run."""
 
 import argparse
-from pathlib import Path
 
 from micstools import command
-from micstools.commands.base import Command
 from micstools.pictures import plots, scene
 from micstools.piles import pile
 from micstools.reading.reader import BadRun
-
-
-def picture_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to draw and where."""
-    parser.add_argument("run", type=Path, help=command.RUN_HELP)
-    parser.add_argument("--times", type=float, nargs="+", help="[s]; default: as in the paper")
-    parser.add_argument("--view", nargs="+", choices=scene.VIEWS)
-    parser.add_argument("--out", type=Path, help="folder for the pictures, default RUN/pictures")
-    parser.add_argument("--width", type=int, default=1200, help="of a picture [pixels]")
 
 
 def draw_pictures(given: argparse.Namespace) -> int:
@@ -43,12 +32,6 @@ def draw_pictures(given: argparse.Namespace) -> int:
     return 0
 
 
-def history_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which run and where to."""
-    parser.add_argument("run", type=Path, help=command.RUN_HELP)
-    parser.add_argument("--out", type=Path, help="default RUN/pictures/history.png")
-
-
 def draw_history(given: argparse.Namespace) -> int:
     """Draw and save the diagrams."""
     run = command.open_run(given.run)
@@ -59,26 +42,8 @@ def draw_history(given: argparse.Namespace) -> int:
     return 0
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    picture_arguments(parser)
-    parser.add_argument("--history", action="store_true", help="the diagrams only")
-
-
-def _plot(given: argparse.Namespace) -> int:
+def work(given: argparse.Namespace) -> int:
     if not given.history:
         draw_pictures(given)
     given.out = given.out / "history.png" if given.out else None
     return draw_history(given)
-
-
-PLOT = Command(
-    "plot",
-    "Draw the blocks and the water of a run, and its history.",
-    (
-        "plot mics-coarse",
-        "plot mics-coarse --times 0.2 5 --view front",
-        "plot mics-coarse --history",
-    ),
-    _arguments,
-    _plot,
-)

@@ -13,21 +13,12 @@ import numpy as np
 from micstools import files
 from micstools.cases import case_copy, program, settings
 from micstools.cases.convergence import Convergence, converge
-from micstools.commands.base import Command
 from micstools.piles import maps, pile_ensemble, pile_numbers
 from micstools.reading import units
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Unit, Units, ascii_of
 
 _ENDED = (0, 3)  # codes of a run that would end in the same way again
-
-
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    program.add_case(parser)
-    add = parser.add_argument
-    add("--cells", required=True, metavar="A,B,C", help="times the cells of the case, rising")
-    add("--threads", type=int, help="of each run, default: all cores")
-    add("--out", type=Path, help="folder, default mics-study-CASE")
 
 
 def _factors(word: str) -> list[float]:
@@ -69,7 +60,7 @@ def _code(result: Path) -> int:
     return int(Run(result).provenance.get("exit_status", -1))
 
 
-def _study(given: argparse.Namespace) -> int:
+def work(given: argparse.Namespace) -> int:
     factors, text = _factors(given.cells), program.case_text(given.case, given.settings)
     path = program.find(given.program, given.case)
     folder = given.out or Path(f"mics-study-{given.case.stem}")
@@ -125,18 +116,3 @@ def _words(told: Convergence, unit: Unit) -> str:
     limit, error = unit.text(told.limit, 5), unit.text(told.error, 2)
     sign = "+" if told.error > 0 else ""
     return f"order {told.order:.2f}, limit {limit}, error {sign}{error}"
-
-
-STUDY = Command(
-    "study",
-    "Run a case on coarser and finer cells: each number of the pile, its observed order and an\n"
-    "estimate of its error (study.csv, study.json). A second call runs what is missing. Piles are\n"
-    "chaotic: what does not converge says so. A grid on which the run ends with code 3 is left\n"
-    "out, and the exit code is 3.",
-    (
-        "study input/blocks_coarse.nml --cells 1,1.5,2",
-        "study input/blocks.nml --cells 0.5,0.75,1 --set run.t_end=0.8 --set drop.count=1",
-    ),
-    _arguments,
-    _study,
-)

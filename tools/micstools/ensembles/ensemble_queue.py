@@ -54,7 +54,11 @@ def client(queue: Queue, jobs: int, folder: Path) -> Iterator[Any]:
     other by a certificate of this call alone; nothing of them is served beyond the loopback
     address. Other options are those of dask-jobqueue's own file, ~/.config/dask/jobqueue.yaml."""
     extras.need("ensemble")
-    dask_jobqueue = _imported()
+    # The module, without what it makes of Ctrl-C when it is imported: an exit without a word
+    ours = signal.getsignal(signal.SIGINT)
+    import dask_jobqueue
+
+    signal.signal(signal.SIGINT, ours)
     import dask
     from dask.distributed import Client, Security
 
@@ -93,15 +97,6 @@ def client(queue: Queue, jobs: int, folder: Path) -> Iterator[Any]:
         found.adapt(minimum=jobs, maximum=jobs)  # new ones for those whose time is over
         with Client(found) as client:
             yield client
-
-
-def _imported() -> Any:
-    """The module, without what it makes of Ctrl-C when it is imported: an exit without a word."""
-    ours = signal.getsignal(signal.SIGINT)
-    import dask_jobqueue
-
-    signal.signal(signal.SIGINT, ours)
-    return dask_jobqueue
 
 
 def _telling(job: Any, answers: SimpleQueue[str]) -> Any:

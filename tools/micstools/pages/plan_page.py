@@ -52,11 +52,13 @@ def content(found: SetUp, north: float | None = None) -> list[Markup | None]:
 
 def parts(found: SetUp) -> dict[str, Markup | None]:
     """What is said of a set-up: warnings, figures, blocks, plan."""
+    # The plan in the words of the program
+    said = tag("div", *(_part(part) for part in found.plan), class_="parts")
     return {
         "warnings": _warnings(found),
         "facts": _facts(found),
         "blocks": _blocks(found),
-        "plan": _plan(found),
+        "plan": section("plan", "The plan", said),
     }
 
 
@@ -156,12 +158,6 @@ def _groups(found: SetUp) -> Iterator[list[int]]:
         yield blocks
 
 
-def _plan(found: SetUp) -> Markup:
-    """The plan in the words of the program."""
-    said = tag("div", *(_part(part) for part in found.plan), class_="parts")
-    return section("plan", "The plan", said)
-
-
 def _part(part: Part) -> Markup:
     heading = tag("h3", part.heading)
     rows: list[list[object]] = [[name, text] for name, text in part.pairs]
@@ -188,10 +184,13 @@ def scene(found: SetUp, north: float | None = None) -> dict[str, Any]:
     for k in come:
         if b.release_time[k] <= 0:  # it comes in at the start, and is a ghost before
             packed["bodies"][k]["release"] = 1e-6
+    # Two corners [m] of each box that the centroids of blocks to come may start in
+    place = found.place - found.run.grid.low
+    boxes = np.stack([place - found.spread, place + found.spread], axis=1)
     return packed | {
         "plan": {
             "cells": _cells(run) if _wet(run) else [[], [], []],
-            "reach": _reaches(found),
+            "reach": [box.tolist() for box in np.unique(boxes[found.spread.any(axis=1)], axis=0)],
             "liquid": _boxes(run),
             "ways": _ways(found),
             "marks": marks(found),
@@ -241,13 +240,6 @@ def _boxes(run: Run) -> list[list[list[float]]]:
         [(np.clip(box[end], low, high) - low).tolist() for end in ("min", "max")]
         for box in run.parameters.get("water", [])
     ]
-
-
-def _reaches(found: SetUp) -> list[list[list[float]]]:
-    """Two corners [m] of each box that the centroids of blocks to come may start in."""
-    place = found.place - found.run.grid.low
-    boxes = np.stack([place - found.spread, place + found.spread], axis=1)
-    return [box.tolist() for box in np.unique(boxes[found.spread.any(axis=1)], axis=0)]
 
 
 def _ways(found: SetUp) -> list[dict[str, Any]]:

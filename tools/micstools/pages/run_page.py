@@ -27,7 +27,7 @@ from micstools.piles.pile_numbers import PileNumbers
 from micstools.reading import block_numbers, health, places, scales, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.health import Check
-from micstools.reading.overlap import Placed, present_bodies
+from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
 from micstools.reading.units import Units, figure
 from micstools.shapes.geometry import Array
@@ -142,8 +142,14 @@ def percent(share: float) -> str:
 def _pile(run: Run, shown: Units) -> Markup:
     """The pile of the end from three sides."""
     bodies = present_bodies(run, -1)
-    level = _last_level(run)
-    sheet = Sheet(run.grid.low, _upper_corner(run, bodies, level), bed_of(run))
+    # The mean level of the water at the end; the one it should have where no field was written
+    level = pile.water_level(run).found if pile.has_level(run) else pile.still_level(run)
+    # Of what is shown: the tank, but for much air above the pile and the water
+    tops = [float(body.points[:, 2].max()) for body in bodies.values()]
+    low, high = run.grid.low, np.array(run.grid.high)
+    needed = max([*tops, *([level] if level is not None else [])], default=float(high[2]))
+    high[2] = min(high[2], max(needed, low[2]) + 0.1 * float((high - low).max()))
+    sheet = Sheet(run.grid.low, high, bed_of(run))
     colours = block_colours(run.bodies.dropped, run.bodies.n)
     drawn = [
         sheet.drawing(bodies, colours, view, shown.length, level)
@@ -193,20 +199,6 @@ def _places(run: Run, shown: Units) -> Markup:
     )
     return section("places", "Where units lie", *(tag("p", words) for words in said),
                    table(heads, rows), take, defined)  # fmt: skip
-
-
-def _upper_corner(run: Run, bodies: dict[int, Placed], level: float | None) -> Array:
-    """Of what is shown: the tank, but for much air above the pile and the water."""
-    tops = [float(body.points[:, 2].max()) for body in bodies.values()]
-    low, high = run.grid.low, np.array(run.grid.high)
-    needed = max([*tops, *([level] if level is not None else [])], default=float(high[2]))
-    high[2] = min(high[2], max(needed, low[2]) + 0.1 * float((high - low).max()))
-    return high
-
-
-def _last_level(run: Run) -> float | None:
-    """The mean level of the water at the end; the one it should have where no field was written."""
-    return pile.water_level(run).found if pile.has_level(run) else pile.still_level(run)
 
 
 def _blocks(run: Run, found: Found) -> Markup:

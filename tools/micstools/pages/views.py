@@ -98,25 +98,21 @@ def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Imag
     pixels = colour[seen.block]
     pixels[..., :3] *= seen.light[..., None]
     if edges and covered.size >= _LINED * len(shown):
-        pixels[_edges(seen)] = (28, 32, 38, 255)
+        # Where one block ends before another or a face bends
+        found = np.zeros(seen.block.shape, dtype=bool)
+        for axis in (0, 1):
+            other = np.diff(seen.block, axis=axis) != 0
+            bend = np.abs(np.diff(seen.light, axis=axis)) > 0.02
+            with np.errstate(invalid="ignore"):
+                jump = np.abs(np.diff(seen.depth, axis=axis)) > 12 * seen.step
+            line = other | bend | jump
+            first, second = [slice(None)] * 2, [slice(None)] * 2
+            first[axis], second[axis] = slice(None, -1), slice(1, None)
+            found[tuple(first)] |= line & (seen.block[tuple(first)] > 0)
+            found[tuple(second)] |= other & (seen.block[tuple(first)] == 0)
+        pixels[np.asarray(found & (seen.block > 0))] = (28, 32, 38, 255)
     flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
     return Image.fromarray(flipped, "RGBA")
-
-
-def _edges(seen: Seen) -> NDArray[np.bool_]:
-    """Where one block ends before another or a face bends."""
-    found = np.zeros(seen.block.shape, dtype=bool)
-    for axis in (0, 1):
-        other = np.diff(seen.block, axis=axis) != 0
-        bend = np.abs(np.diff(seen.light, axis=axis)) > 0.02
-        with np.errstate(invalid="ignore"):
-            jump = np.abs(np.diff(seen.depth, axis=axis)) > 12 * seen.step
-        line = other | bend | jump
-        first, second = [slice(None)] * 2, [slice(None)] * 2
-        first[axis], second[axis] = slice(None, -1), slice(1, None)
-        found[tuple(first)] |= line & (seen.block[tuple(first)] > 0)
-        found[tuple(second)] |= other & (seen.block[tuple(first)] == 0)
-    return np.asarray(found & (seen.block > 0))
 
 
 def uri(picture: Image.Image, colours: int = 96) -> str:

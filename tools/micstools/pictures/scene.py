@@ -113,7 +113,23 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     width = style.width if view != "side" else int(0.55 * style.width)
     shown = fields if style.water else None
     still_water = style.water and view != "top"
-    plotter = _stage(run, row, shown, still_water, width, camera)
+    # Tank, bed, blocks at a row and the water of some fields, or that of a light run
+    plotter = new_plotter(width, int(width * camera.aspect))
+    # One actor for all blocks of a colour: thousands are drawn in seconds
+    colours = block_colours(run)
+    alike: dict[str, list[Placed]] = {}
+    for k, body in present_bodies(run, row).items():
+        alike.setdefault(colours[k], []).append(body)
+    for colour, bodies in alike.items():
+        faces = [triangles_of(body.points, body.shape.triangles) for body in bodies]
+        edges = [_edges(body.points, body.shape) for body in bodies]
+        _add_solid(plotter, vtk_data.joined(faces), vtk_data.joined(edges), colour)
+    add_tank(plotter, run.grid.low, run.grid.high)
+    add_bed(plotter, run)
+    if shown is not None:
+        add_water(plotter, run, shown)
+    if still_water:
+        add_still_water(plotter, run)
     arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
     if fields is not None and style.arrows:
         arrows = arrows_of(run, fields, view)
@@ -129,21 +145,6 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     plotter.close()
     image.save(path)
     return path
-
-
-def _stage(
-    run: Run, row: int, fields: Fields | None, still_water: bool, width: int, camera: Camera
-) -> Plotter:
-    """Tank, bed, blocks at a row and the water of some fields, or that of a light run."""
-    plotter = new_plotter(width, int(width * camera.aspect))
-    _add_blocks(plotter, run, row)
-    add_tank(plotter, run.grid.low, run.grid.high)
-    add_bed(plotter, run)
-    if fields is not None:
-        add_water(plotter, run, fields)
-    if still_water:
-        add_still_water(plotter, run)
-    return plotter
 
 
 def arrow_speed(run: Run, times: list[float], views: list[str]) -> float:
@@ -230,18 +231,6 @@ def block_colours(run: Run) -> list[str]:
         DROPPED[order[k] % len(DROPPED)] if k in order else FIXED[still.index(k) % len(FIXED)]
         for k in range(run.bodies.n)
     ]
-
-
-def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
-    """One actor for all blocks of a colour: thousands are drawn in seconds."""
-    colours = block_colours(run)
-    alike: dict[str, list[Placed]] = {}
-    for k, body in present_bodies(run, row).items():
-        alike.setdefault(colours[k], []).append(body)
-    for colour, bodies in alike.items():
-        faces = [triangles_of(body.points, body.shape.triangles) for body in bodies]
-        edges = [_edges(body.points, body.shape) for body in bodies]
-        _add_solid(plotter, vtk_data.joined(faces), vtk_data.joined(edges), colour)
 
 
 def add_block(plotter: Plotter, points: Array, shape: Shape, colour: str) -> tuple[Any, Any]:

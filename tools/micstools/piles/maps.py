@@ -24,14 +24,10 @@ def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Ar
     top = np.full((n[1], n[0]), -np.inf)
     if bodies:
         triangles = np.concatenate([body.triangles for body in bodies])
-        _raise(top, _facing_up(triangles), low, step)
+        # Those (m, 3, 3) of a closed surface that are seen from above
+        u, v = (triangles[:, k, :2] - triangles[:, 0, :2] for k in (1, 2))
+        _raise(top, np.asarray(triangles[u[:, 0] * v[:, 1] > u[:, 1] * v[:, 0]]), low, step)
     return np.where(np.isfinite(top), top, np.nan)
-
-
-def _facing_up(triangles: Array) -> Array:
-    """Those (m, 3, 3) of a closed surface that are seen from above."""
-    u, v = (triangles[:, k, :2] - triangles[:, 0, :2] for k in (1, 2))
-    return np.asarray(triangles[u[:, 0] * v[:, 1] > u[:, 1] * v[:, 0]])
 
 
 def _raise(top: Array, triangles: Array, low: Array, step: float) -> None:

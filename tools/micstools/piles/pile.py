@@ -265,27 +265,20 @@ def still_level(run: Run) -> float | None:
     return demanded_level(run, len(run.bodies.time) - 1)
 
 
-def measured_level(run: Run, t: float, guess: float) -> float:
-    """Mean height [m] of the surface at time `t` [s], over all columns of cells.
-
-    Blocks through the surface count as the liquid around them, which `liquid` continues in them;
-    so waves of any length cancel. Only cells within five cells of `guess` [m] are summed: bubbles
-    under blocks and drops on the walls do not count.
-    """
-    fields, grid = run.fields_at(t), run.grid
-    step = float(grid.spacing[2])
-    middle = int((guess - grid.low[2]) / step)
-    low, high = max(0, middle - 5), min(len(grid.z) - 1, middle + 6)
-    columns = fields.liquid[low:high].sum(axis=0, dtype=np.float64)
-    return float(grid.z[low] + step * columns.mean())
-
-
 def water_level(run: Run) -> Level:
     """Level at the last written field."""
     t = float(run.field_times[-1])
     demanded = demanded_level(run, run.bodies.row(t))
     start = float(run.value("fluid", "water_level"))
-    return Level(start, measured_level(run, t, demanded), demanded)
+    # The mean height over all columns of cells: blocks through the surface count as the liquid
+    # around them, which `liquid` continues in them, so waves of any length cancel. Only cells
+    # within five of the level demanded are summed: no bubbles under blocks, no drops on walls
+    fields, grid = run.fields_at(t), run.grid
+    step = float(grid.spacing[2])
+    middle = int((demanded - grid.low[2]) / step)
+    low, high = max(0, middle - 5), min(len(grid.z) - 1, middle + 6)
+    columns = fields.liquid[low:high].sum(axis=0, dtype=np.float64)
+    return Level(start, float(grid.z[low] + step * columns.mean()), demanded)
 
 
 def level(found: Level, length: Unit) -> Finding:

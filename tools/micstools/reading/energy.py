@@ -53,7 +53,12 @@ def largest_made(run: Run, limit: Array) -> Made:
     """The energy that contact made in the step where that is the most over the `limit` of each row
     (T) [J]; known where each row is a step and no wall moves, which may give energy."""
     unknown = float("nan")
-    if _walls_move(run):
+    # Does a side of the tank that blocks can touch move along itself?
+    if any(
+        np.any(run.value("boundary", f"{side}_velocity"))
+        for side, kind in run.sides.items()
+        if kind in WALL_KINDS
+    ):
         reason = "a wall moves and gives energy by friction"
         return Made(unknown, float(limit.min()), unknown, 0, reason)
     gains = _gains(run)
@@ -109,12 +114,3 @@ def _single_steps(run: Run) -> NDArray[np.bool_]:
     dt = run.series.dt[1 : time.size]
     found[1 : dt.size + 1] = np.abs(np.diff(time)[: dt.size] - dt) <= _SAME * dt
     return found
-
-
-def _walls_move(run: Run) -> bool:
-    """Does a side of the tank that blocks can touch move along itself?"""
-    return any(
-        np.any(run.value("boundary", f"{side}_velocity"))
-        for side, kind in run.sides.items()
-        if kind in WALL_KINDS
-    )

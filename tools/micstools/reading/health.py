@@ -10,7 +10,6 @@ from micstools.reading.energy import ENERGY_LIMIT
 from micstools.reading.overlap import Overlap, overlap
 from micstools.reading.reader import Run
 from micstools.reading.units import Units, figure
-from micstools.shapes.geometry import Array
 
 DRIFT = 1e-9
 """Of the liquid volume: what rounding explains."""
@@ -71,16 +70,6 @@ def checks(run: Run, units: Units) -> list[Check]:
 def overlap_limit(run: Run) -> float:
     """What no overlap may exceed at the end of a run [m]."""
     return OVERLAP * scales.smallest(run)
-
-
-def energy_limits(run: Run) -> Array:
-    """What contact may make in the step of each row (T) by rounding and by the length of its
-    substeps [J]; infinite where nothing has weight."""
-    at_rest = MADE * scales.weight(run) * scales.smallest(run) or np.inf
-    limits = np.full(run.bodies.time.size, at_rest)
-    moving = run.series.kinetic_energy_bodies[: limits.size - 1]
-    limits[1 : moving.size + 1] += MADE_OF_MOTION * np.nan_to_num(moving)
-    return limits
 
 
 def divergence_limit(run: Run) -> float:
@@ -180,7 +169,13 @@ def _stiffer(run: Run) -> str:
 
 
 def _made(run: Run, units: Units) -> Check:
-    made = energy.largest_made(run, energy_limits(run))
+    # What contact may make in the step of each row (T) by rounding and by the length of its
+    # substeps [J]; infinite where nothing has weight
+    at_rest = MADE * scales.weight(run) * scales.smallest(run) or np.inf
+    limits = np.full(run.bodies.time.size, at_rest)
+    moving = run.series.kinetic_energy_bodies[: limits.size - 1]
+    limits[1 : moving.size + 1] += MADE_OF_MOTION * np.nan_to_num(moving)
+    made = energy.largest_made(run, limits)
     name = "largest energy that contact made in a step"
     wanted = f"below {units.energy.text(made.limit)}" if np.isfinite(made.limit) else "none"
     if made.reason:

@@ -130,7 +130,15 @@ class Site:
         sent = request.headers.get("Sec-Fetch-Site", "none") not in _OURS
         entering = request.method == "GET" and request.path == "/" and "key" in request.query
         if entering and self._lets_in(request.query["key"]):
-            return self._entrance(sent)
+            # a browser that was `sent` by the private file would follow a redirect without the
+            # cookie, as for any other page
+            self.entered.set()
+            if sent:
+                answer = page_answer(_forward("/"))
+            else:
+                answer = web.Response(status=303, headers={"Location": "/"})
+            answer.set_cookie(self.cookie, self.session, httponly=True, samesite="Strict", path="/")
+            return answer
         if sent:
             return web.Response(status=403, text="another page asks")
         if not _same(request.cookies.get(self.cookie, ""), self.session):
@@ -146,17 +154,6 @@ class Site:
         self.keys = {key: end for key, end in self.keys.items() if end > now}
         found = [key for key in self.keys if _same(given, key)]
         return bool(found and self.keys.pop(found[0]))
-
-    def _entrance(self, sent: bool) -> web.Response:
-        """The answer with the cookie, which leads to the page. A browser that was `sent` by the
-        private file would follow a redirect without the cookie, as for any other page."""
-        self.entered.set()
-        if sent:
-            answer = page_answer(_forward("/"))
-        else:
-            answer = web.Response(status=303, headers={"Location": "/"})
-        answer.set_cookie(self.cookie, self.session, httponly=True, samesite="Strict", path="/")
-        return answer
 
 
 def _same(given: str, wanted: str) -> bool:

@@ -137,11 +137,18 @@ def run_parts(run: Run, found: State) -> Parts:
     said = f"{run_words.capital(found.words)} at t = {t} of {end} s"
     if found.running:
         said += f", {clock(found.left)} left at this pace"
+    # The table of the step, the newest row first; columns that mean nothing here are left out
+    s = run.series
+    shown = [c for c in _STEP if s.time.size and np.isfinite(getattr(s, c[1])[-1])]
+    rows: list[list[object]] = [
+        [format(float(getattr(s, name)[k]), form) for _, name, form in shown]
+        for k in range(s.time.size - 1, max(-1, s.time.size - 1 - _ROWS), -1)
+    ]
     parts = {
         "state": markup(said + ".", _way_on(run, found)),
         "bar": bar(found.share, said),
         "facts": _facts(run, found),
-        "step": _step(run),
+        "step": table([words for words, _, _ in shown], rows),
     }
     return parts | {"history": markup(*_history(run))}
 
@@ -178,17 +185,6 @@ def _speeds(run: Run) -> Array:
         return np.asarray(np.linalg.norm(b.velocity[-1], axis=1))
     way = np.linalg.norm(b.position[-1] - b.position[-2], axis=1)
     return np.asarray(way / (b.time[-1] - b.time[-2]))
-
-
-def _step(run: Run) -> Markup:
-    """The table of the step, the newest row first; columns that mean nothing here are left out."""
-    s = run.series
-    shown = [c for c in _STEP if s.time.size and np.isfinite(getattr(s, c[1])[-1])]
-    rows: list[list[object]] = [
-        [format(float(getattr(s, name)[k]), form) for _, name, form in shown]
-        for k in range(s.time.size - 1, max(-1, s.time.size - 1 - _ROWS), -1)
-    ]
-    return table([words for words, _, _ in shown], rows)
 
 
 def _history(run: Run) -> list[Markup]:

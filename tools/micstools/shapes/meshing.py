@@ -131,7 +131,8 @@ def closed(points: Array, triangles: IntArray, volume: float | None = None) -> S
         raise BadSurface("the file holds no closed surface")
     warnings = []
     if not mesh.is_watertight:
-        open_edges = _open_edges(mesh)
+        _, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+        open_edges = int((count != 2).sum())
         try:
             faces, n_holes = holes.fill(np.asarray(mesh.vertices, float), np.asarray(mesh.faces))
         except holes.NotPlane as reason:
@@ -188,11 +189,6 @@ def simplified(surface: Surface, faces: int) -> Surface:
     found.warnings[:0] = [*surface.warnings, said]
     found.unit = surface.unit
     return found
-
-
-def _open_edges(mesh: Any) -> int:
-    _, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
-    return int((count != 2).sum())
 
 
 def _parts(mesh: Any) -> list[tuple[Array, IntArray]]:
