@@ -10,9 +10,11 @@ module check_m
   logical, parameter :: checked = index(compiler_options(), '-fcheck=all') > 0
   integer :: n_passed = 0, n_failed = 0
 
-  !> One check: of a condition, of equal integers, or of reals within an absolute tolerance.
+  !> One check: of a condition, of equal integers, or of reals within an absolute tolerance, without
+  !! one of equal reals; a number that is expected of an array is so of each element.
   interface check
     procedure :: check_condition, check_integer, check_real, check_reals
+    procedure :: check_each_1, check_each_2, check_each_3, check_each_4
   end interface check
 
 contains
@@ -50,7 +52,8 @@ contains
   !> Passes when |value - expected| <= tolerance; NaN fails.
   subroutine check_real(name, value, expected, tolerance)
     character(*), intent(in) :: name
-    real(wp), intent(in) :: value, expected, tolerance
+    real(wp), intent(in) :: value, expected
+    real(wp), intent(in), optional :: tolerance
 
     call check_reals(name, [value], [expected], tolerance)
   end subroutine check_real
@@ -58,20 +61,58 @@ contains
   !> Passes when every |value - expected| <= tolerance.
   subroutine check_reals(name, value, expected, tolerance)
     character(*), intent(in) :: name
-    real(wp), intent(in) :: value(:), expected(:), tolerance
+    real(wp), intent(in) :: value(:), expected(:)
+    real(wp), intent(in), optional :: tolerance
+    real(wp) :: most
     logical :: good
-    integer :: i
+    integer :: i, shown
 
+    most = 0.0_wp
+    if (present(tolerance)) most = tolerance
     good = size(value) == size(expected)
-    if (good) good = all(abs(value - expected) <= tolerance)
+    if (good) good = all(abs(value - expected) <= most)
     call check_condition(name, good)
     if (good) return
+    shown = 0
     do i = 1, min(size(value), size(expected))
-      if (abs(value(i) - expected(i)) <= tolerance) cycle
+      if (abs(value(i) - expected(i)) <= most .or. shown == 10) cycle
+      shown = shown + 1
       write (error_unit, '(a, i0, 3(a, es24.16))') '  element ', i, ': got ', value(i), &
-        ', expected ', expected(i), ', tolerance ', tolerance
+        ', expected ', expected(i), ', tolerance ', most
     end do
   end subroutine check_reals
+
+  subroutine check_each_1(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value(:), expected
+    real(wp), intent(in), optional :: tolerance
+
+    call check_reals(name, [value], spread(expected, 1, size(value)), tolerance)
+  end subroutine check_each_1
+
+  subroutine check_each_2(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value(:, :), expected
+    real(wp), intent(in), optional :: tolerance
+
+    call check_reals(name, [value], spread(expected, 1, size(value)), tolerance)
+  end subroutine check_each_2
+
+  subroutine check_each_3(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value(:, :, :), expected
+    real(wp), intent(in), optional :: tolerance
+
+    call check_reals(name, [value], spread(expected, 1, size(value)), tolerance)
+  end subroutine check_each_3
+
+  subroutine check_each_4(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value(:, :, :, :), expected
+    real(wp), intent(in), optional :: tolerance
+
+    call check_reals(name, [value], spread(expected, 1, size(value)), tolerance)
+  end subroutine check_each_4
 
   !> Print the counts; stop with code 1 when a check failed or none was made.
   subroutine finish_checks()

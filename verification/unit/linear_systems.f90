@@ -7,12 +7,14 @@ module linear_systems_m
   use case_types_m, only: grid_input_t, boundary_input_t
   use grid_m, only: grid_t, grid_init, unit_step
   use linear_operator_m, only: linear_operator_t
+  use krylov_m, only: krylov_work_t, krylov_init
+  use multigrid_m, only: multigrid_t
   use parallel_m, only: halo_exchange
   use random_counter_m, only: uniform, random_rotation
   use vectors_m, only: rotation_matrix
   implicit none
   private
-  public :: face_operator_t, make_grid, set_tank, set_random, set_right_side
+  public :: system_t, make_grid, set_tank, set_random, complete
 
   !> The seven-point operator of the face coefficients `cf`, without bodies.
   type, extends(linear_operator_t) :: face_operator_t
@@ -22,6 +24,15 @@ module linear_systems_m
   contains
     procedure :: apply => apply_faces
   end type face_operator_t
+
+  !> A system on the grid with its preconditioner and the arrays of the solvers.
+  type :: system_t
+    type(grid_t) :: grid
+    type(face_operator_t) :: op
+    type(multigrid_t) :: multigrid
+    type(krylov_work_t) :: work
+    real(wp), allocatable :: b(:, :, :), x(:, :, :)
+  end type system_t
 
   integer, parameter :: n_blocks = 7, samples = 4   !! blocks in the tank, points per edge of a face
   real(wp), parameter :: edge = 0.02_wp             !! of the seven cubes of a block [m]
@@ -151,15 +162,12 @@ contains
     call allocate_operator(grid, op)
     do d = 1, 3
       e = unit_step(:, d)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          do i = grid%lo(1), grid%hi(1) + e(1)
-            number = number_of(grid, [i, j, k], d)
-            op%aperture(i, j, k, d) = merge(0.0_wp, 1.0_wp, uniform(seed, 1, number) < 0.25_wp)
-            op%cf(i, j, k, d) = op%aperture(i, j, k, d)*grid%area(d)/grid%h(d) &
-              *10.0_wp**(3*uniform(seed, 2, number))
-          end do
-        end do
+      do concurrent (k=grid%lo(3):grid%hi(3) + e(3), &
+        j=grid%lo(2):grid%hi(2) + e(2), i=grid%lo(1):grid%hi(1) + e(1))
+        number = number_of(grid, [i, j, k], d)
+        op%aperture(i, j, k, d) = merge(0.0_wp, 1.0_wp, uniform(seed, 1, number) < 0.25_wp)
+        op%cf(i, j, k, d) = op%aperture(i, j, k, d)*grid%area(d)/grid%h(d) &
+          *10.0_wp**(3*uniform(seed, 2, number))
       end do
     end do
     call set_sides(grid, op)
@@ -223,6 +231,17 @@ contains
     end do
   end subroutine set_sides
 
+  !> Right side, preconditioner and work arrays of a grid with its operator.
+  subroutine complete(system)
+    type(system_t), intent(inout) :: system
+
+    call set_right_side(system%grid, system%op, system%b)
+    allocate (system%x, source=0*system%b)
+    call krylov_init(system%grid, system%work)
+    call system%multigrid%init(system%grid)
+    call system%multigrid%setup(system%op%cf)
+  end subroutine complete
+
   !> Right side: net flux into each cell of a velocity field through the open faces, smooth plus
   !! rough. So it is zero in closed cells and has no mean where nothing flows out.
   subroutine set_right_side(grid, op, b)
@@ -235,16 +254,12 @@ contains
       grid%lo(3) - 1:grid%hi(3) + 1), source=0.0_wp)
     do d = 1, 3
       e = unit_step(:, d)
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            b(i, j, k) = b(i, j, k) + flux([i, j, k], d) - flux([i, j, k] + e, d)
-          end do
-        end do
+      do concurrent (k=grid%lo(3):grid%hi(3), j=grid%lo(2):grid%hi(2), i=grid%lo(1):grid%hi(1))
+        b(i, j, k) = b(i, j, k) + flux([i, j, k], d) - flux([i, j, k] + e, d)
       end do
     end do
   contains
-    real(wp) function flux(c, d)
+    pure real(wp) function flux(c, d)
       integer, intent(in) :: c(3), d
       real(wp) :: x(3)
       integer :: i(3)
@@ -279,11 +294,9 @@ contains
       do j = lo(2), hi(2)
         do i = lo(1), hi(1)
           y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
-            + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
-            + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
-            + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
-            + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
-            + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+            + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) + cf(i, j, k, 2)*(x(i, j, k) &
+            - x(i, j - 1, k)) + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) + cf(i, j, &
+            k, 3)*(x(i, j, k) - x(i, j, k - 1)) + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
         end do
       end do
     end do

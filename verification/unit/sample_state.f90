@@ -2,13 +2,15 @@
 module sample_state_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
+  use case_text_m, only: case_of, body
+  use case_check_m, only: make_shapes
+  use errors_m, only: problems_t
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_init
   use solid_geometry_m, only: solid_geometry_init
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use case_blocks_m, only: blocks_init
-  use contacts_m, only: contact_solver_t, contacts_init
+  use contacts_m, only: contacts_init
   use displacements_m, only: displacements_t
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
@@ -31,16 +33,20 @@ contains
     real(wp), intent(in) :: start
     logical, intent(in) :: periodic   !! in x
     type(sample_t), intent(out) :: s
-    type(shape_t) :: shapes(2)
-    character(:), allocatable :: message
+    type(shape_t), allocatable :: shapes(:)
+    type(problems_t) :: problems
+    real(wp), parameter :: q(4) = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+    character(*), parameter :: lf = new_line('a')
     integer :: b
 
-    call make_case(periodic, s%case)
-    s%parameters = '&run'//new_line('a')//'  t_end = 2'//new_line('a')//'  dt = 0.01' &
-      //new_line('a')//'/' &
-      //new_line('a')
-    call make_shape(s%case%shape(1), shapes(1), message)
-    call make_shape(s%case%shape(2), shapes(2), message)
+    s%case = case_of('&run t_end=2/ &grid cells=16,6,20 length=.16,.06,.2/ &shape name="block" ' &
+      //'kind="box" size=.02,.015,.01/ &shape name="hexapod" kind="hexapod" size=.01/ ' &
+      //trim(merge('&boundary x_min="periodic" x_max="periodic"/', repeat(' ', 44), periodic)) &
+      //body('block', [0.04_wp, 0.03_wp, 0.1_wp], q=q, more='fixed=T') &
+      //body('block', [0.08_wp, 0.03_wp, 0.1_wp], q=q) &
+      //body('hexapod', [0.12_wp, 0.03_wp, 0.1_wp], q=q, more='release_time=1.5'))
+    s%parameters = '&run'//lf//'  t_end = 2'//lf//'  dt = 0.01'//lf//'/'//lf
+    call make_shapes(s%case, shapes, problems)
     call grid_init(s%case%grid, s%case%boundary, s%grid)
     call clock_init(s%case%run, s%clock)
     call flow_init(s%grid, s%flow)
@@ -69,53 +75,19 @@ contains
       s%blocks%contact_force(:, b) = start + [1.1_wp, 1.2_wp, 1.3_wp]*b
       s%blocks%contacts(b) = b
     end do
-    call make_displacements(start, s%contacts)
+    call fill_displacements(start, 4, s%contacts%displacements)
+    call fill_displacements(2*start, 3, s%contacts%sleep%frozen)
+    s%contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
   end subroutine make_sample
 
-  subroutine make_case(periodic, case)
-    logical, intent(in) :: periodic
-    type(case_t), intent(out) :: case
-    integer :: b
-
-    case%text = '&run t_end = 2 /'//new_line('a')
-    case%run%title = 'sample'
-    case%run%output = 'sample-out'
-    case%run%t_end = 2.0_wp
-    case%grid%cells = [16, 6, 20]
-    case%grid%length = [0.16_wp, 0.06_wp, 0.2_wp]
-    if (periodic) case%boundary%kind(:, 1) = 'periodic'
-    allocate (case%shape(2), case%body(3), case%drop(0), case%water(0))
-    case%shape(1)%name = 'block'
-    case%shape(1)%kind = 'box'
-    case%shape(1)%size = [0.02_wp, 0.015_wp, 0.01_wp]
-    case%shape(2)%name = 'hexapod'
-    case%shape(2)%kind = 'hexapod'
-    case%shape(2)%size(1) = 0.01_wp
-    do b = 1, 3
-      case%body(b)%shape = case%shape(merge(2, 1, b == 3))%name
-      case%body(b)%position = [0.04_wp*b, 0.03_wp, 0.1_wp]
-      case%body(b)%quaternion = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
-      case%body(b)%fixed = b == 1
-    end do
-    case%body(3)%release_time = 1.5_wp
-  end subroutine make_case
-
-  subroutine make_displacements(start, contacts)
+  !> The first n of four.
+  subroutine fill_displacements(start, n, s)
     real(wp), intent(in) :: start
-    class(contact_solver_t), intent(inout) :: contacts
-
-    call fill_displacements(start, contacts%displacements)
-    contacts%displacements%n = 4
-    call fill_displacements(2*start, contacts%sleep%frozen)
-    contacts%sleep%frozen%n = 3
-    contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
-  end subroutine make_displacements
-
-  subroutine fill_displacements(start, s)
-    real(wp), intent(in) :: start
+    integer, intent(in) :: n
     type(displacements_t), intent(inout) :: s
     integer :: i
 
+    s%n = n
     s%a = [2, 2, 3, 3]
     s%b = [1, -1, 1, 2]
     s%id = [7, 8, 9, 10]
@@ -133,24 +105,18 @@ contains
     real(wp), intent(in) :: start
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: m
-    real(wp), intent(out) :: a(grid%first(1):grid%last(1), &
-                               grid%first(2):grid%last(2), &
-                               grid%first(3):grid%last(3), m)
+    real(wp), intent(out) &
+      :: a(grid%first(1):grid%last(1), grid%first(2):grid%last(2), grid%first(3):grid%last(3), m)
     integer :: i, j, k, d, e, cell(3)
 
-    do d = 1, m
-      do k = grid%first(3), grid%last(3)
-        do j = grid%first(2), grid%last(2)
-          do i = grid%first(1), grid%last(1)
-            cell = [i, j, k]
-            do e = 1, 3
-              if (grid%periodic(e)) cell(e) = modulo(cell(e) - 1, grid%n(e)) + 1
-            end do
-            a(i, j, k, d) = start + sin(1.0_wp*cell(1) + 100.0_wp*cell(2) + 10000.0_wp*cell(3) &
-              + 0.37_wp*d)
-          end do
-        end do
+    do concurrent (d=1:m, k=grid%first(3):grid%last(3), &
+      j=grid%first(2):grid%last(2), i=grid%first(1):grid%last(1))
+      cell = [i, j, k]
+      do e = 1, 3
+        if (grid%periodic(e)) cell(e) = modulo(cell(e) - 1, grid%n(e)) + 1
       end do
+      a(i, j, k, d) = start + sin(1.0_wp*cell(1) + 100.0_wp*cell(2) + 10000.0_wp*cell(3) &
+        + 0.37_wp*d)
     end do
   end subroutine fill_cells
 

@@ -24,8 +24,8 @@ contains
 
     call check('logarithm', quaternion_log(quaternion_exp(w)), w, 1.0e-15_wp)
     call check('the shorter way', quaternion_log(-quaternion_exp(w)), w, 1.0e-15_wp)
-    call check('of none', quaternion_log([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), [0.0_wp, 0.0_wp, &
-      0.0_wp], 0.0_wp)
+    call check('of none', &
+      quaternion_log([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), [0.0_wp, 0.0_wp, 0.0_wp])
   end subroutine check_log
 
   !> A motion with uneven times and turns about all axes.
@@ -59,11 +59,11 @@ contains
       call check('and its attitude', abs(dot_product(turned, q(:, i)/norm2(q(:, i)))), 1.0_wp, &
         1.0e-15_wp)
     end do
-    call check('starts and ends at rest', [v, omega], spread(0.0_wp, 1, 6), 0.0_wp)
+    call check('starts and ends at rest', [v, omega], spread(0.0_wp, 1, 6))
     call pose_at(motion, 0.5_wp, at, turned, v, omega)
-    call check('held before', [at - x(:, 1), v, omega], spread(0.0_wp, 1, 9), 0.0_wp)
+    call check('held before', [at - x(:, 1), v, omega], spread(0.0_wp, 1, 9))
     call pose_at(motion, 9.0_wp, at, turned, v, omega)
-    call check('held after', [at - x(:, 5), v, omega], spread(0.0_wp, 1, 9), 0.0_wp)
+    call check('held after', [at - x(:, 5), v, omega], spread(0.0_wp, 1, 9))
     ! differences: an error of h^2 times the third derivative, and round-off over h
     do i = 1, 300
       t = 0.9_wp + 0.0107_wp*i
@@ -109,8 +109,8 @@ contains
     end do
     call check('fastest in the middle', fastest_between(motion, 0.1_wp, 0.2_wp), [0.0_wp, 0.9_wp], &
       1.0e-15_wp)
-    call check('none later', maxval(fastest_between(motion, 2.0_wp, 3.0_wp)), 0.0_wp, 0.0_wp)
-    call check('none before', maxval(fastest_between(motion, -2.0_wp, -1.0_wp)), 0.0_wp, 0.0_wp)
+    call check('none later', maxval(fastest_between(motion, 2.0_wp, 3.0_wp)), 0.0_wp)
+    call check('none before', maxval(fastest_between(motion, -2.0_wp, -1.0_wp)), 0.0_wp)
 
     angle = [0.0_wp, 0.0_wp, 0.1_wp, 1.2_wp]
     do i = 1, 4
@@ -122,7 +122,7 @@ contains
       call pose_at(motion, 0.01_wp*i, at, turned, v, omega)
       s = 2.0_wp*atan2(turned(3), turned(1))
       call check('turns one way only', s >= last - 1.0e-15_wp .and. s <= 1.2_wp + 1.0e-15_wp)
-      if (i <= 100) call check('held', abs(s), 0.0_wp, 0.0_wp)
+      if (i <= 100) call check('held', abs(s), 0.0_wp)
       last = s
     end do
   end subroutine check_hinge
@@ -154,9 +154,9 @@ contains
     call given_motion_init([1.0_wp], reshape([1.0_wp, 2.0_wp, 3.0_wp], [3, 1]), &
       reshape([0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp], [4, 1]), motion)
     call pose_at(motion, 2.0_wp, at, turned, v, omega)
-    call check('held for ever', [at, turned, v, omega], [1.0_wp, 2.0_wp, 3.0_wp, 0.0_wp, 0.0_wp, &
-      1.0_wp, 0.0_wp, spread(0.0_wp, 1, 6)], 0.0_wp)
-    call check('no speed', maxval(fastest_between(motion, 0.0_wp, 2.0_wp)), 0.0_wp, 0.0_wp)
+    call check('held for ever', [at, turned, v, omega], &
+      [1.0_wp, 2.0_wp, 3.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, spread(0.0_wp, 1, 6)])
+    call check('no speed', maxval(fastest_between(motion, 0.0_wp, 2.0_wp)), 0.0_wp)
   end subroutine check_one_row
 
 end module test_given_motion_m

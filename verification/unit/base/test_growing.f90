@@ -35,7 +35,7 @@ contains
       capacity = size(whole)
     end do
     call check('integers are kept', all(whole(:n) == [(i, i=1, n)]))
-    call check('reals are kept', maxval(abs(x(:n) - [(0.5_wp*i, i=1, n)])), 0.0_wp, 0.0_wp)
+    call check('reals are kept', x(:n), [(0.5_wp*i, i=1, n)])
     call check('logicals are kept', all(even(:n) .eqv. [(modulo(i, 2) == 0, i=1, n)]))
     call check('room of 16, 32, 64, 128: by doubling', changes, 4)
     call check('no more room than that', capacity, 128)
@@ -61,7 +61,7 @@ contains
       quaternion(:, i) = real(i, wp)
       face(:, i) = [i, i + 1]
     end do
-    call check('vectors are kept', maxval(abs(x(3, :n) - [(2.0_wp*i, i=1, n)])), 0.0_wp, 0.0_wp)
+    call check('vectors are kept', x(3, :n), [(2.0_wp*i, i=1, n)])
     call check('three numbers each', size(x, 1), 3)
     call check('columns of four', all(shape(quaternion) == [4, 64]))
     call check('columns of two', all(face(2, :n) == [(i + 1, i=1, n)]) .and. size(face, 1) == 2)

@@ -48,8 +48,7 @@ contains
     call global_sum(cells)
     call global_max(most)
     call check('blocks hold all cells', int(cells(1)), product(n))
-    call check('busiest process has at most 1.5 fair shares', &
-      most(1)*nproc() <= 1.5_wp*product(n))
+    call check('busiest process has at most 1.5 fair shares', most(1)*nproc() <= 1.5_wp*product(n))
     call check('inside the domain', all(lo >= 1 .and. hi <= n))
     call check('lower sides known', all(lo == 1 .eqv. at_side(1, :)))
     call check('upper sides known', all(hi == n .eqv. at_side(2, :)))
@@ -90,12 +89,8 @@ contains
     call decompose(n, periodic, lo, hi, at_side)
     allocate (a(lo(1) - w:hi(1) + w, lo(2) - w:hi(2) + w, lo(3) - w:hi(3) + w), source=-1.0_wp)
     allocate (b(lo(1) - w:hi(1) + w, lo(2) - w:hi(2) + w, lo(3) - w:hi(3) + w, 2), source=-1.0_wp)
-    do k = lo(3), hi(3)
-      do j = lo(2), hi(2)
-        do i = lo(1), hi(1)
-          a(i, j, k) = label([i, j, k], n, periodic)
-        end do
-      end do
+    do concurrent (k=lo(3):hi(3), j=lo(2):hi(2), i=lo(1):hi(1))
+      a(i, j, k) = label([i, j, k], n, periodic)
     end do
     b(:, :, :, 1) = a
     b(:, :, :, 2) = merge(-2.0_wp - a, -1.0_wp, a > 0)
@@ -152,12 +147,8 @@ contains
 
     call decompose(n, all_open, lo, hi, at_side)
     allocate (wanted(n(1), n(2), n(3)), whole(n(1), n(2), n(3)), single(n(1), n(2), n(3)))
-    do k = 1, n(3)
-      do j = 1, n(2)
-        do i = 1, n(1)
-          wanted(i, j, k) = label([i, j, k], n, all_open)
-        end do
-      end do
+    do concurrent (k=1:n(3), j=1:n(2), i=1:n(1))
+      wanted(i, j, k) = label([i, j, k], n, all_open)
     end do
     whole = 0.0_wp
     call gather_all(wanted(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3)), lo, hi, whole)
@@ -175,7 +166,7 @@ contains
     m = [my_rank() + 1_i8, 1_i8]
     call global_max(x)
     call global_sum(m)
-    call check('largest', x, [nproc() - 1.0_wp, 7.0_wp], 0.0_wp)
+    call check('largest', x, [nproc() - 1.0_wp, 7.0_wp])
     call check('sum of counts', int(m(1)), nproc()*(nproc() + 1)/2)
     call check('number of processes', int(m(2)), nproc())
   end subroutine test_reductions
@@ -197,18 +188,18 @@ contains
     a = lo - w
     b = hi + w
     s = whole_sum([x(1:n(1), 1:n(2), 1:n(3))**2])
-    call check('dot product', exact_dot(x(a(1):b(1), a(2):b(2), a(3):b(3)), &
-      x(a(1):b(1), a(2):b(2), a(3):b(3)), w), s, 0.0_wp)
+    call check('dot product', &
+      exact_dot(x(a(1):b(1), a(2):b(2), a(3):b(3)), x(a(1):b(1), a(2):b(2), a(3):b(3)), w), s)
     mine = [x(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3))]
     s = whole_sum([x(1:n(1), 1:n(2), 1:n(3))])
-    call check('sum', exact_sum(mine), s, 0.0_wp)
+    call check('sum', exact_sum(mine), s)
     pair = exact_sums(reshape([mine, 2*mine], [size(mine), 2]))
-    call check('two sums', pair, [s, 2*s], 0.0_wp)
+    call check('two sums', pair, [s, 2*s])
     accumulator(:, 1) = no_terms
     if (my_rank() == nproc() - 1) call exact_add([2.0_wp**(-30), 3.0e10_wp], accumulator(:, 1))
     if (is_root()) call exact_add([-3.0e10_wp], accumulator(:, 1))
     call exact_totals(accumulator, total)
-    call check('terms of different size on different processes', total(1), 2.0_wp**(-30), 0.0_wp)
+    call check('terms of different size on different processes', total(1), 2.0_wp**(-30))
   end subroutine test_sums
 
   !> The same numbers on every process.

@@ -83,9 +83,9 @@ contains
     c(2, 3) = 1.0_wp
     c(3, 4) = 1.0_wp
     call check('face on the plane, body above', &
-               volume_of_part(c, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp), 0.0_wp, 0.0_wp)
+      volume_of_part(c, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp), 0.0_wp)
     call check('face on the plane, body below', &
-               volume_of_part(c, [0.0_wp, 0.0_wp, -1.0_wp], 0.0_wp), 1.0_wp/6.0_wp, 0.0_wp)
+      volume_of_part(c, [0.0_wp, 0.0_wp, -1.0_wp], 0.0_wp), 1.0_wp/6.0_wp)
     call check('half by a plane through an edge', &
                volume_of_part(c, [1.0_wp, -1.0_wp, 0.0_wp], 0.0_wp), 1.0_wp/12.0_wp, 1e-17_wp)
     good = .true.

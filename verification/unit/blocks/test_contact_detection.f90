@@ -41,7 +41,7 @@ contains
       call check(model//': the model', detected%exact .eqv. model == 'surface')
       call detect_contacts(walls, blocks, 0.0_wp, detected)
       call check(model//': nothing touches', detected%points%n + detected%soon%n, 0)
-      call check(model//': and swings', detected%frequency2, 0.0_wp, 0.0_wp)
+      call check(model//': and swings', detected%frequency2, 0.0_wp)
       call detect_contacts(walls, blocks, ahead, detected)
       call check(model//': but soon', all([detected%points%n, detected%soon%n] == [0, 1]))
       call check(model//': it will swing', detected%frequency2, once, 1.0e-6_wp*once)

@@ -198,10 +198,10 @@ contains
     call check('damping in the middle', force, k_n*d + eta*(closing - 0.5_wp*dt*force/mass(2)), &
       1.0e-12_wp*force)
     call check('Courant number', report%courant_max, closing*dt/0.5_wp, 1.0e-15_wp)
-    call check('overlap', report%overlap_max, d, 0.0_wp)
+    call check('overlap', report%overlap_max, d)
     detected%counterparts%v(3, 2) = 2*k_n*d/eta
     call sum_forces(dt, detected, displacements, loads, report)
-    call check('never pulls', loads%force(3, 2), 0.0_wp, 0.0_wp)
+    call check('never pulls', loads%force(3, 2), 0.0_wp)
   end subroutine check_damping
 
   !> However strong a dashpot is, it stops the motion within a substep and does not turn it round.
@@ -271,13 +271,13 @@ contains
     point(3)%normal = [0.6_wp, 0.0_wp, 0.8_wp]
     call detect_again(point, detected, displacements)
     call check('one is new', all(detected%groups%new(:3) .eqv. [.true., .false., .false.]))
-    call check('and begins at nothing', displacements%xi(:, 1), 0*x, 0.0_wp)
+    call check('and begins at nothing', displacements%xi(:, 1), 0*x)
     call check('one stays', displacements%xi(:, 2), 3*dt*x, 1.0e-15_wp)
     call check('one turns with its plane', displacements%xi(:, 3), dt*[0.8_wp, 0.0_wp, -0.6_wp], &
       1.0e-15_wp)
     call detect_again(point(2:2), detected, displacements)
     call detect_again(point, detected, displacements)
-    call check('what has parted is forgotten', displacements%xi(:, 3), 0*x, 0.0_wp)
+    call check('what has parted is forgotten', displacements%xi(:, 3), 0*x)
   end subroutine check_memory
 
 end module test_contact_forces_m

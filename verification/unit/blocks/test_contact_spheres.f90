@@ -92,7 +92,7 @@ contains
     associate (point => points%item(1))
       call check('the floor', point%b, -5)
       call check('depth in the floor', point%depth, d, 1.0e-15_wp)
-      call check('normal into the floor', point%normal, -z, 0.0_wp)
+      call check('normal into the floor', point%normal, -z)
       call check('place on the floor', point%arm_a, -(r(2) - d)*z, 1.0e-15_wp)
     end associate
   end subroutine check_floor
@@ -153,8 +153,7 @@ contains
       end do
       call find(0.0_wp)
       n = n + points%n
-      call check('overlap of all', sum(points%item(:points%n)%depth), overlap_of_all(), &
-        1.0e-13_wp)
+      call check('overlap of all', sum(points%item(:points%n)%depth), overlap_of_all(), 1.0e-13_wp)
     end do
     call check('they touch often', n > 1000)
   end subroutine check_kept_list

@@ -97,8 +97,7 @@ contains
     depth = 2.0e-4_wp
     do upper = 1, 2
       call new_world(world, ['cube', 'cube'])
-      world%blocks%q(:, upper) = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], &
-                                                      atan(sqrt(2.0_wp)))
+      world%blocks%q(:, upper) = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], atan(sqrt(2.0_wp)))
       world%blocks%x(1:2, upper) = [0.503_wp, 0.498_wp]
       world%blocks%x(3, upper) = 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth
       call find(world)
@@ -126,8 +125,7 @@ contains
     call check('two edges cross', world%points%n, 1)
     call check('depth between the edges', world%points%item(1)%depth, depth, 1.0e-15_wp)
     call check('they count', world%points%item(1)%weight, 1.0_wp, 1.0e-15_wp)
-    call check('normal to both', world%points%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], &
-      1.0e-14_wp)
+    call check('normal to both', world%points%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], 1.0e-14_wp)
     call check('where they cross', world%points%item(1)%arm_b(1:2), [0.003_wp, 0.0_wp], 1.0e-15_wp)
     world%blocks%x(3, 2) = world%blocks%x(3, 2) + 2*depth
     call find(world)

@@ -25,14 +25,14 @@ contains
       //'kind="cube" size=.02/ &shape name="large" kind="cube" size=.3/ &body shape="small" ' &
       //'position=3*1/ &body shape="large" position=3*2/ &body shape="small" position=3*3/', world)
     deep = world%deep
-    call check('the smaller counts', size_of_pair(2, 1, deep), size(1), 0.0_wp)
-    call check('a wall has no size', size_of_pair(2, floor, deep), size(2), 0.0_wp)
+    call check('the smaller counts', size_of_pair(2, 1, deep), size(1))
+    call check('a wall has no size', size_of_pair(2, floor, deep), size(2))
     call store_overlap(2, 1, 0.0009_wp, deep)
-    call check('4.5 % are not noted', maxval(deep%share), 0.0_wp, 0.0_wp)
+    call check('4.5 % are not noted', maxval(deep%share), 0.0_wp)
     call store_overlap(2, 1, 0.0011_wp, deep)
     call store_overlap(2, floor, 0.024_wp, deep)
     call check('shares of both', deep%share(:3), [0.055_wp, 0.08_wp, 0.0_wp], 1.0e-12_wp)
-    call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp], 0.0_wp)
+    call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp])
     call check('with whom', deep%counterpart(1) == 2 .and. deep%counterpart(2) == floor)
     call check('no fault yet', len(overlap_fault(deep)) == 0)
     warnings = 3

@@ -64,9 +64,8 @@ contains
     yes = n == wanted%n
     if (.not. yes) return
     yes = all(displacements%a(:n) == bodies) .and. all(displacements%b(:n) == 1) &
-      .and. all(displacements%id(:n) == wanted%id(:n)) &
-      .and. all(abs(displacements%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
-      .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
+      .and. all(displacements%id(:n) == wanted%id(:n)) .and. all(abs(displacements%xi(:, :n) &
+      - wanted%xi(:, :n)) <= 0.0_wp) .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
       .and. all(abs(displacements%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
       .and. all(abs(displacements%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
       .and. all(abs(displacements%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
@@ -121,11 +120,11 @@ contains
     call form_groups(points, groups)
     call check('ids and bodies', groups%n, 3)
     call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
-    call check('one alone', groups%normal(:, 1), x, 0.0_wp)
+    call check('one alone', groups%normal(:, 1), x)
     call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
     call check('mean point', groups%arm_a(:, 2), (3*x + 12*y)/7, 1.0e-15_wp)
     call check('seen from b', groups%arm_b(:, 2), (3*x + 12*y)/7 - y, 1.0e-15_wp)
-    call check('opposite normals', groups%normal(:, 3), x, 0.0_wp)
+    call check('opposite normals', groups%normal(:, 3), x)
   end subroutine check_groups
 
   !> Pairs met are noted once, sorted.

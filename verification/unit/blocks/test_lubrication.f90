@@ -70,14 +70,13 @@ contains
       found = film_resistance(mu, d/2, a, h)
       call check('resistance of a film', found, expected, 1.0e-6_wp*expected)
       step = 1.0e-4_wp*h
-      found = (film_impulse(mu, d/2, a, h + step) &
-        - film_impulse(mu, d/2, a, h - step))/(2*step)
+      found = (film_impulse(mu, d/2, a, h + step) - film_impulse(mu, d/2, a, h - step))/(2*step)
       call check('change of the impulse', found, expected, 1.0e-6_wp*expected)
     end do
     h = 1.0e-3_wp*d/2
     call check('a thin film', film_resistance(mu, d/2, 1.0e3_wp*d, h), 6*pi*mu*(d/2)**2/h, &
                1.0e-3_wp*6*pi*mu*(d/2)**2/h)
-    call check('none below', film_impulse(mu, d/2, a, -h), 0.0_wp, 0.0_wp)
+    call check('none below', film_impulse(mu, d/2, a, -h), 0.0_wp)
   end subroutine check_resistance
 
   !> A sphere that flies on to a wall loses what the film takes, just once on its way.

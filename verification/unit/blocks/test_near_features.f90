@@ -70,8 +70,7 @@ contains
     call check('one corner of each', all([near%of_a%n, near%of_b%n] == 1))
     call check('seven hundredths away', [near%of_a%away(1), near%of_b%away(1)], &
       [0.07_wp, 0.07_wp], 1.0e-14_wp)
-    call check('the corner of b', cube%vertex(:, near%of_b%vertex(1)), &
-      -[0.5_wp, 0.5_wp, 0.5_wp], 0.0_wp)
+    call check('the corner of b', cube%vertex(:, near%of_b%vertex(1)), -[0.5_wp, 0.5_wp, 0.5_wp])
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.4_wp, 0.3_wp, 1.05_wp], &
       no_turn, no_turn)), ball, cube, search, near)
     call check('a ball under a cube', all([near%of_a%n, near%of_b%n, near%n_crossings] &
@@ -139,9 +138,8 @@ contains
       end do
       call check('the vertex is listed', m > 0)
       if (m == 0) cycle
-      call nearest_on_surface(cube, place, &
-        list%facet(list%facet_first(m):list%facet_first(m + 1) - 1), &
-        list%edge(list%edge_first(m):list%edge_first(m + 1) - 1), distance, outward)
+      call nearest_on_surface(cube, place, list%facet(list%facet_first(m):list%facet_first(m + 1) &
+        - 1), list%edge(list%edge_first(m):list%edge_first(m + 1) - 1), distance, outward)
       call check('with what is nearest to it', distance, wanted, 1.0e-14_wp)
       call check('no sooner than told', list%away(m) <= way + wanted + 1.0e-14_wp)
     end do
@@ -158,8 +156,7 @@ contains
 
     do i = 1, cube%n_convex
       do j = 1, cube%n_convex
-        call cross_edges(edge_in_view(a_in_b, cube%edge(i)), cube%edge(j), -ahead, deep, &
-          crossing)
+        call cross_edges(edge_in_view(a_in_b, cube%edge(i)), cube%edge(j), -ahead, deep, crossing)
         if (crossing%weight <= 0.0_wp) cycle
         n = n + 1
         do m = near%n_crossings, 1, -1
@@ -229,9 +226,8 @@ contains
       longest = 0.0_wp
       do k = 1, 100
         longest = max(longest, norm2(place(now%x_a, now%q_a, radius_a, 2*k) &
-          - place(before%x_a, before%q_a, radius_a, 2*k) &
-          - place(now%x_b, now%q_b, radius_b, 2*k + 1) &
-          + place(before%x_b, before%q_b, radius_b, 2*k + 1)))
+          - place(before%x_a, before%q_a, radius_a, 2*k) - place(now%x_b, &
+          now%q_b, radius_b, 2*k + 1) + place(before%x_b, before%q_b, radius_b, 2*k + 1)))
       end do
       call check('none goes further', longest <= way)
       call check('some nearly as far', longest > 0.6_wp*way)

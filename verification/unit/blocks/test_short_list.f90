@@ -135,8 +135,7 @@ contains
 
     do i = 1, cube%n_convex
       do j = 1, cube%n_convex
-        call cross_edges(edge_in_view(a_in_b, cube%edge(i)), cube%edge(j), -gap, deep, &
-          crossing)
+        call cross_edges(edge_in_view(a_in_b, cube%edge(i)), cube%edge(j), -gap, deep, crossing)
         if (crossing%weight <= 0.0_wp) cycle
         n = n + 1
         call check('the crossing is listed', any(item(1::2) == i .and. item(2::2) == j))

@@ -75,7 +75,7 @@ contains
     call check('warned of: beyond it', highest > maxval(heights(s) - true_heights) - 3e-4_wp)
     call build('sphere', 'centroid', 1, 0.0_wp, s)
     call height_errors(s, lowest, highest)
-    call check('sphere: no warning', [lowest, highest], [0.0_wp, 0.0_wp], 0.0_wp)
+    call check('sphere: no warning', [lowest, highest], [0.0_wp, 0.0_wp])
   end subroutine centroid_heights
 
   !> A sphere inscribed in a tetrahedron under the surface touches all four faces.

@@ -19,11 +19,10 @@ contains
   end subroutine test_substep_limits
 
   subroutine check_equal_substeps()
-    call check('an equal substep', equal_substep(1.0_wp, 0.3_wp), 0.25_wp, 0.0_wp)
-    call check('no shorter than has to be', equal_substep(1.0_wp, 0.25_wp), 0.25_wp, 0.0_wp)
-    call check('nor for round-off', equal_substep(1.0_wp, 0.25_wp*(1.0_wp - 1.0e-12_wp)), 0.25_wp, &
-      0.0_wp)
-    call check('all that is left', equal_substep(0.2_wp, 1.0_wp), 0.2_wp, 0.0_wp)
+    call check('an equal substep', equal_substep(1.0_wp, 0.3_wp), 0.25_wp)
+    call check('no shorter than has to be', equal_substep(1.0_wp, 0.25_wp), 0.25_wp)
+    call check('nor for round-off', equal_substep(1.0_wp, 0.25_wp*(1.0_wp - 1.0e-12_wp)), 0.25_wp)
+    call check('all that is left', equal_substep(0.2_wp, 1.0_wp), 0.2_wp)
   end subroutine check_equal_substeps
 
   !> A body above a floor, another far up: each of the limits in turn.
@@ -45,10 +44,10 @@ contains
     detected%bounding_radius = [0.1_wp, 0.1_wp]
     detected%smallest = 0.02_wp
     detected%unlisted_gap = 0.05_wp
-    call check('a share of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), &
-      0.005_wp, 0.0_wp)
-    call check('of the contact time', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
-      0.01_wp, 0.0_wp)
+    call check('a share of the step', &
+      substep_limit(walls, detected, blocks, 0.01_wp, limits), 0.005_wp)
+    call check('of the contact time', &
+      substep_limit(walls, detected, blocks, 1.0_wp, limits), 0.01_wp)
     blocks%v(3, 2) = -100.0_wp
     call check('no jump into another', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       0.05_wp/100.0_wp, 1.0e-18_wp)

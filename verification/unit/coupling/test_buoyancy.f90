@@ -60,8 +60,7 @@ contains
     call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
                          force)
     call check(kind//': force', force(1:3, 1), -weight, 1.0e-12_wp*norm2(weight))
-    call check(kind//': no torque', norm2(force(4:6, 1)), 0.0_wp, &
-               1.0e-12_wp*norm2(weight)*0.05_wp)
+    call check(kind//': no torque', norm2(force(4:6, 1)), 0.0_wp, 1.0e-12_wp*norm2(weight)*0.05_wp)
     block%bodies%present = .false.
     call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
                          force)

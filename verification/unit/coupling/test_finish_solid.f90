@@ -27,7 +27,7 @@ contains
     call shared_face(0.7_wp, 0.6_wp)
     call finish_faces(solid)
     call check('scaled to one', solid%face_beta, [7/13.0_wp, 6/13.0_wp], 1.0e-15_wp)
-    call check('closed', open_share(), 0.0_wp, 0.0_wp)
+    call check('closed', open_share(), 0.0_wp)
     call shared_face(0.7_wp, 0.6_wp)
     call make_way(2, solid)
     call check('the bed makes way', solid%face_beta, [0.7_wp, 0.3_wp], 1.0e-15_wp)
@@ -35,15 +35,15 @@ contains
     call shared_face(0.3_wp, 0.2_wp)
     call make_way(2, solid)
     call finish_faces(solid)
-    call check('shares that fit stay', solid%face_beta, [0.3_wp, 0.2_wp], 0.0_wp)
+    call check('shares that fit stay', solid%face_beta, [0.3_wp, 0.2_wp])
     call check('open by the rest', open_share(), 0.5_wp, 1.0e-15_wp)
 
     call shared_cell(0.6_wp, 0.6_wp)
     call finish_cells(grid, solid)
-    call check('full', solid%alpha(c(1), c(2), c(3)), 1.0_wp, 0.0_wp)
-    call check('closed all round', sum(solid%aperture(c(1), c(2), c(3), :)) &
-               + solid%aperture(c(1) + 1, c(2), c(3), 1) + solid%aperture(c(1), c(2) + 1, c(3), 2) &
-               + solid%aperture(c(1), c(2), c(3) + 1, 3), 0.0_wp, 0.0_wp)
+    call check('full', solid%alpha(c(1), c(2), c(3)), 1.0_wp)
+    call check('closed all round', &
+      sum(solid%aperture(c(1), c(2), c(3), :)) + solid%aperture(c(1) + 1, c(2), c(3), 1) &
+      + solid%aperture(c(1), c(2) + 1, c(3), 2) + solid%aperture(c(1), c(2), c(3) + 1, 3), 0.0_wp)
     call check('not cut', solid%n_cut, 0)
     call clear_cells(solid)
     call clear_faces(grid, solid)
@@ -55,9 +55,9 @@ contains
 
     call guard_links(voxels, solid)
     links = links_on_grid(solid)
-    call check('the wall is at the centre inside, below', links%high(c(1), c(2), c(3), 1), &
-               1.0e-3_wp, 0.0_wp)
-    call check('and above', links%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
+    call check('the wall is at the centre inside, below', &
+      links%high(c(1), c(2), c(3), 1), 1.0e-3_wp)
+    call check('and above', links%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp)
     call check('six links, of the body', solid%n_link == 6 &
                .and. links%body_low(c(1), c(2), c(3), 2) == 1)
     call check('no others', count(links%low < no_hit), 6)

@@ -92,9 +92,9 @@ contains
   subroutine check_who_moves()
     call check('free', all(bodies%free .eqv. [.true., .false., .false., .false., .true.]))
     call check('present', all(bodies%present .eqv. [.true., .true., .true., .false., .true.]))
-    call check('motion of one held', bodies%motion(:, 2), 2.0_wp*[1, 2, 3, 4, 5, 6], 0.0_wp)
-    call check('no motion before its time', maxval(abs(bodies%motion(:, 4))), 0.0_wp, 0.0_wp)
-    call check('place', bodies%x(:, 4), [2.0_wp, 2.0_wp, 2.0_wp], 0.0_wp)
+    call check('motion of one held', bodies%motion(:, 2), 2.0_wp*[1, 2, 3, 4, 5, 6])
+    call check('no motion before its time', bodies%motion(:, 4), 0.0_wp)
+    call check('place', bodies%x(:, 4), [2.0_wp, 2.0_wp, 2.0_wp])
   end subroutine check_who_moves
 
   !> A force over a time changes the momentum, a torque the angular momentum, of the free ones only.
@@ -115,8 +115,7 @@ contains
       call check('angular momentum', matmul(bodies%inertia(:, :, b), change(4:6)), &
         dt*force(4:6, b), 1.0e-13_wp)
     end do
-    call check('the others stay', maxval(abs(bodies%motion(:, 2:4) - before%motion(:, 2:4))), &
-      0.0_wp, 0.0_wp)
+    call check('the others stay', bodies%motion(:, 2:4) - before%motion(:, 2:4), 0.0_wp)
   end subroutine check_push
 
 end module test_push_bodies_m

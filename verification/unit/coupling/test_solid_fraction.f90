@@ -22,17 +22,20 @@ module test_solid_fraction_m
 
   real(wp), parameter :: d = 0.02_wp   !! cube edge of the hexapod [m]
   real(wp), parameter :: identity(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  type(grid_t) :: grid
+  type(blocks_t) :: blocks
+  type(solid_geometry_t) :: solid
   integer :: n_drawn = 0
 
 contains
 
   subroutine test_solid_fraction()
-    call random_poses('hexapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 100)
-    call random_poses('hexapod', [60, 10, 25], [0.3_wp, 0.1_wp, 0.2_wp], 100)
-    call random_poses('cylinder', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
-    call random_poses('tetrapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
-    call random_poses('dolos', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
-    call random_poses('reef_cube', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+    call random_poses('hexapod', [60, 20, 40], 100)
+    call random_poses('hexapod', [60, 10, 25], 100)
+    call random_poses('cylinder', [60, 20, 40], 40)
+    call random_poses('tetrapod', [60, 20, 40], 40)
+    call random_poses('dolos', [60, 20, 40], 40)
+    call random_poses('reef_cube', [60, 20, 40], 40)
     call against_tetrahedra()
     call faces_on_grid_planes()
     call both_sides_alike()
@@ -59,73 +62,64 @@ contains
     q = random_rotation(4712, n_drawn)
   end function draw_attitude
 
-  !> A grid with walls all round.
-  function make_grid(n, length) result(grid)
+  !> The grid, with walls all round.
+  subroutine tank(n, length)
     integer, intent(in) :: n(3)
-    real(wp), intent(in) :: length(3)
-    type(grid_t) :: grid
+    real(wp), intent(in) :: length(3)   !! [m]
+    type(grid_t) :: fresh
 
+    grid = fresh
     call simple_grid(n, length, grid)
     grid%side = side_no_slip
-  end function make_grid
+  end subroutine tank
 
-  !> A body alone.
-  subroutine make_body(kind, size, x, q, blocks)
+  !> Bodies of one shape, all present; upright if not told otherwise.
+  subroutine put(kind, size, x, q)
     character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(:), x(3), q(4)
-    type(blocks_t), intent(out) :: blocks
-
-    call make_bodies(kind, size, reshape(x, [3, 1]), reshape(q, [4, 1]), blocks)
-  end subroutine make_body
-
-  !> Bodies of one shape, all present.
-  subroutine make_bodies(kind, size, x, q, blocks)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(:), x(:, :), q(:, :)
-    type(blocks_t), intent(out) :: blocks
+    real(wp), intent(in) :: size(:), x(:)        !! [m], 3 for each body [m]
+    real(wp), intent(in), optional :: q(4)       !! attitude
+    type(blocks_t) :: fresh
     type(shape_input_t) :: input
     character(:), allocatable :: message
-    integer :: n
 
-    n = ubound(x, 2)
+    blocks = fresh
     input%kind = kind
     input%size(:ubound(size, 1)) = size
-    blocks%n = n
-    allocate (blocks%shapes(1), blocks%shape(n), blocks%present(n))
-    blocks%shape = 1
-    blocks%present = .true.
-    allocate (blocks%x(3, n), source=x)
-    allocate (blocks%q(4, n), source=q)
+    blocks%n = ubound(x, 1)/3
+    allocate (blocks%shapes(1))
+    blocks%shape = spread(1, 1, blocks%n)
+    blocks%present = spread(.true., 1, blocks%n)
+    blocks%x = reshape(x, [3, blocks%n])
+    blocks%q = spread(identity, 2, blocks%n)
+    if (present(q)) blocks%q(:, 1) = q
     call make_shape(input, blocks%shapes(1), message)
     call check('the '//kind//' is built', message == '')
-  end subroutine make_bodies
+  end subroutine put
 
-  subroutine fill(grid, blocks, solid)
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
-    type(solid_geometry_t), intent(out) :: solid
-    type(solid_fraction_t) :: fraction
-
-    call solid_geometry_init(grid, solid, blocks%n)
-    call solid_fraction_init(grid, blocks, fraction)
-    call update_solid(fraction, grid, blocks, solid)
+  subroutine fill()
+    call fill_other(solid)
   end subroutine fill
 
+  subroutine fill_other(other)
+    type(solid_geometry_t), intent(out) :: other
+    type(solid_fraction_t) :: fraction
+
+    call solid_geometry_init(grid, other, blocks%n)
+    call solid_fraction_init(grid, blocks, fraction)
+    call update_solid(fraction, grid, blocks, other)
+  end subroutine fill_other
+
   !> Shares times cell volumes give the volume and the centroid, in one object moved many times.
-  subroutine random_poses(kind, n, length, poses)
+  subroutine random_poses(kind, n, poses)
     character(*), intent(in) :: kind
     integer, intent(in) :: n(3), poses
-    real(wp), intent(in) :: length(3)
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
+    real(wp), parameter :: length(3) = [0.3_wp, 0.1_wp, 0.2_wp]
     type(solid_fraction_t) :: fraction
-    real(wp) :: worst(3, 2), centroid(3), size_m(3)   ! 2: with a corner moved onto a plane
+    real(wp) :: worst(3, 2), centroid(3)   ! 2: with a corner moved onto a plane
     integer :: p, m, k
 
-    grid = make_grid(n, length)
-    size_m = [merge(d, 2*d, kind == 'hexapod'), 2*d, 0.0_wp]
-    call make_body(kind, size_m, 0.5_wp*length, identity, blocks)
+    call tank(n, length)
+    call put(kind, [merge(d, 2*d, kind == 'hexapod'), 2*d], 0.5_wp*length)
     call solid_geometry_init(grid, solid, 1)
     call solid_fraction_init(grid, blocks, fraction)
     worst = 0.0_wp
@@ -140,33 +134,26 @@ contains
         do m = 1, last
           centroid = centroid + solid%cell_alpha(m)*(solid%cell_centroid(:, m) - blocks%x(:, 1))
         end do
-        k = merge(2, 1, is_moved(grid, blocks))
+        k = merge(2, 1, is_moved())
         worst(:, k) = max(worst(:, k), [abs(sum(solid%alpha)*grid%volume/whole - 1.0_wp), &
           maxval(abs(centroid))*grid%volume/(whole*d), &
           abs(sum(solid%cell_alpha(:last))*grid%volume/whole - 1.0_wp)])
       end associate
     end do
-    call check(kind//': shares add up to the volume', worst([1, 3], 1), [0.0_wp, 0.0_wp], 1e-12_wp)
+    call check(kind//': shares add up to the volume', worst([1, 3], 1), 0.0_wp, 1e-12_wp)
     call check(kind//': centroids add up to the centroid', worst(2, 1), 0.0_wp, 1e-12_wp)
-    call check(kind//': with corners moved onto planes', worst(:, 2), spread(0.0_wp, 1, 3), 1e-6_wp)
+    call check(kind//': with corners moved onto planes', worst(:, 2), 0.0_wp, 1e-6_wp)
   end subroutine random_poses
 
   !> Does the body have a corner that is moved by more than round-off, by 1e-5 of a cell at most?
-  function is_moved(grid, blocks) result(yes)
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
-    logical :: yes
-    real(wp) :: at(3), r(3, 3)
-    integer :: v
+  logical function is_moved()
+    real(wp), allocatable :: at(:, :)
+    integer :: n
 
-    yes = .false.
-    r = rotation_matrix(blocks%q(:, 1))
-    associate (point => blocks%shapes(1)%point)
-      do v = 1, size(point, 2)
-        at = (blocks%x(:, 1) + matmul(r, point(:, v)))/grid%h
-        yes = yes .or. any(abs(at - anint(at)) > 1e-13_wp .and. abs(at - anint(at)) < 1.1e-5_wp)
-      end do
-    end associate
+    n = size(blocks%shapes(1)%point, 2)
+    at = (spread(blocks%x(:, 1), 2, n) + matmul(rotation_matrix(blocks%q(:, 1)), &
+      blocks%shapes(1)%point))/spread(grid%h, 2, n)
+    is_moved = any(abs(at - anint(at)) > 1e-13_wp .and. abs(at - anint(at)) < 1.1e-5_wp)
   end function is_moved
 
   !> One of the attitudes that turn the axes into each other, with the round-off of real numbers.
@@ -176,53 +163,43 @@ contains
     real(wp), parameter :: axis(3, 3) = real(unit_step, wp)
 
     q = quaternion_product(quaternion_from_axis(axis(:, 1), real(mod(m, 4), wp)*pi/2), &
-                           quaternion_from_axis(axis(:, 3), real(mod(m/4, 4), wp)*pi/2))
+      quaternion_from_axis(axis(:, 3), real(mod(m/4, 4), wp)*pi/2))
   end function quarter_turns
 
   !> Every cell and face against the sum of the clipped tetrahedra of the fine mesh.
   subroutine against_tetrahedra()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    character(7), parameter :: kind(4) = [character(7) :: 'hexapod', 'hexapod', 'hexapod', 'sphere']
-    real(wp), parameter :: size_m(4) = [d, d, d, 0.05_wp]
     real(wp) :: worst(4)
     integer :: p
 
-    grid = make_grid([14, 16, 18], [0.07_wp, 0.08_wp, 0.081_wp])
+    call tank([14, 16, 18], [0.07_wp, 0.08_wp, 0.081_wp])
     worst = 0.0_wp
     do p = 1, 4
-      call make_body(kind(p), size_m(p:p), [0.035_wp, 0.04_wp, 0.04_wp], identity, blocks)
+      call put(trim(merge('sphere ', 'hexapod', p == 4)), [merge(0.05_wp, d, p == 4)], &
+        [0.035_wp, 0.04_wp, 0.04_wp])
       if (p > 1) blocks%q(:, 1) = draw_attitude()
       if (p > 2) blocks%x(:, 1) = blocks%x(:, 1) + 0.005_wp*[draw(), draw(), draw()]
-      call fill(grid, blocks, solid)
-      call compare_with_tets(grid, blocks, solid, worst)
+      call fill()
+      call compare_with_tets(worst)
     end do
     call check('shares of cells as by the tetrahedra', worst(1), 0.0_wp, 1e-14_wp)
-    call check('centroids of cells as by the tetrahedra', worst(2), 0.0_wp, 1e-13_wp)
-    call check('shares of faces as by the tetrahedra', worst(3), 0.0_wp, 1e-13_wp)
-    call check('centroids of faces as by the tetrahedra', worst(4), 0.0_wp, 1e-13_wp)
+    call check('centroids of cells, shares and centroids of faces', worst(2:), 0.0_wp, 1e-13_wp)
   end subroutine against_tetrahedra
 
   !> Largest differences of shares, first moments, face shares, face moments (in cells).
-  subroutine compare_with_tets(grid, blocks, solid, worst)
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
-    type(solid_geometry_t), intent(in) :: solid
+  subroutine compare_with_tets(worst)
     real(wp), intent(inout) :: worst(4)
     real(wp), allocatable :: cell(:, :, :, :), face(:, :, :, :, :, :)
     real(wp) :: r(3, 3), corner(3, 4), v, moment(3), area, x(3), low(3)
     type(polyhedron_t) :: p
-    integer :: t, c, i, j, k, e, m, side, from(3), to(3)
+    integer :: t, i, j, k, e, m, side, from(3), to(3)
 
     associate (n => grid%n, s => blocks%shapes(1))
       allocate (cell(4, n(1), n(2), n(3)), source=0.0_wp)
       allocate (face(4, n(1), n(2), n(3), 3, 2), source=0.0_wp)
       r = rotation_matrix(blocks%q(:, 1))
       do t = 1, size(s%tet, 2)
-        do c = 1, 4   ! in cells
-          corner(:, c) = (blocks%x(:, 1) + matmul(r, s%point(:, s%tet(c, t))))/grid%h
-        end do
+        corner = (spread(blocks%x(:, 1), 2, 4) + matmul(r, s%point(:, s%tet(:, t)))) &
+          /spread(grid%h, 2, 4)   ! in cells
         where (abs(corner - anint(corner)) < 1e-12_wp) corner = anint(corner)
         from = max(floor(minval(corner, 2)) + 1, 1)
         to = min(floor(maxval(corner, 2)) + 1, n)
@@ -244,34 +221,23 @@ contains
           end do
         end do
       end do
-      do k = 1, n(3)
-        do j = 1, n(2)
-          do i = 1, n(1)
-            worst(1) = max(worst(1), abs(solid%alpha(i, j, k) - cell(1, i, j, k)))
-            do e = 1, 3
-              worst(3) = max(worst(3), &
-                             abs(1 - solid%aperture(i, j, k, e) - maxval(face(1, i, j, k, e, :))))
-            end do
-          end do
-        end do
-      end do
+      worst(1) = max(worst(1), maxval(abs(solid%alpha(1:n(1), 1:n(2), 1:n(3)) - cell(1, :, :, :))))
+      worst(3) = max(worst(3), maxval(abs(1 - solid%aperture(1:n(1), 1:n(2), 1:n(3), :) &
+        - maxval(face(1, :, :, :, :, :), 5))))
       do m = 1, solid%body_cell(2) - 1
         associate (c => solid%cell(:, m))
-          if (any(c < 1) .or. any(c > n)) cycle
-          low = real(c - 1, wp)
-          worst(2) = max(worst(2), maxval(abs( &
-            solid%cell_alpha(m)*(solid%cell_centroid(:, m)/grid%h - low) - &
-            cell(2:4, c(1), c(2), c(3)))))
+          if (any(c < 1 .or. c > n)) cycle
+          x = solid%cell_centroid(:, m)/grid%h - (c - 1)
+          worst(2) = max(worst(2), maxval(abs(solid%cell_alpha(m)*x - cell(2:4, c(1), c(2), c(3)))))
         end associate
       end do
       do m = 1, solid%body_face(2) - 1
         associate (c => solid%face(:, m))
-          if (any(c(1:3) < 1) .or. any(c(1:3) > n)) cycle
-          low = real(c(1:3) - 1, wp)
+          if (any(c(1:3) < 1 .or. c(1:3) > n)) cycle
           side = maxloc(face(1, c(1), c(2), c(3), c(4), :), 1)
-          worst(4) = max(worst(4), maxval(abs( &
-            solid%face_beta(m)*(solid%face_centroid(:, m)/grid%h - low) - &
-            face(2:4, c(1), c(2), c(3), c(4), side))))
+          x = solid%face_centroid(:, m)/grid%h - (c(1:3) - 1)
+          worst(4) = max(worst(4), maxval(abs(solid%face_beta(m)*x &
+            - face(2:4, c(1), c(2), c(3), c(4), side))))
         end associate
       end do
     end associate
@@ -297,38 +263,29 @@ contains
 
   !> All axis-parallel poses on the grid: whole cells, whole faces, nothing cut, everything closed.
   subroutine faces_on_grid_planes()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    integer :: p, i, j, k, e, n(3)
-    real(wp) :: want
+    integer :: p, e, a(3), b(3)
     logical :: whole, fits, counted, beta
 
-    grid = make_grid([20, 20, 40], [0.1_wp, 0.1_wp, 0.2_wp])
+    call tank([20, 20, 40], [0.1_wp, 0.1_wp, 0.2_wp])
     whole = .true.
     fits = .true.
     counted = .true.
     beta = .true.
     do p = 0, 15
-      call make_body('hexapod', [d], [0.05_wp, 0.05_wp, 0.16_wp], quarter_turns(p), blocks)
-      call fill(grid, blocks, solid)
+      call put('hexapod', [d], [0.05_wp, 0.05_wp, 0.16_wp], quarter_turns(p))
+      call fill()
       whole = whole .and. solid%n_cut == 0 .and. abs(sum(solid%alpha) - 7*64) <= 0.0_wp
       counted = counted .and. solid%body_cell(2) - 1 == 448 .and. count(solid%inside == 1) == 448
       ! Along each direction one bar of 12 and four of 4 cells, 4 x 4 wide.
       beta = beta .and. solid%body_face(2) - 1 == 3*(16*13 + 4*16*5) .and. &
-             all(abs(solid%face_beta(:solid%body_face(2) - 1) - 1) <= 0.0_wp)
+        all(abs(solid%face_beta(:solid%body_face(2) - 1) - 1) <= 0.0_wp)
       do e = 1, 3
-        do k = 1, grid%n(3)
-          do j = 1, grid%n(2)
-            do i = 1, grid%n(1)
-              n = [i, j, k] - unit_step(:, e)
-              want = 1.0_wp
-              if (max(solid%alpha(i, j, k), solid%alpha(n(1), n(2), n(3))) > 0.5_wp) want = 0.0_wp
-              fits = fits .and. abs(solid%aperture(i, j, k, e) - want) <= 0.0_wp
-            end do
-          end do
-        end do
+        a = 1 - unit_step(:, e)
+        b = grid%n - unit_step(:, e)
+        fits = fits .and. all((solid%aperture(1:20, 1:20, 1:40, e) > 0.0_wp) .neqv. &
+          max(solid%alpha(1:20, 1:20, 1:40), solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3))) > 0.5_wp)
       end do
+      fits = fits .and. all(solid%aperture <= 0.0_wp .or. solid%aperture >= 1.0_wp)
     end do
     call check('on grid planes: cells are full or empty', whole)
     call check('on grid planes: 448 cells, all with the centre inside', counted)
@@ -341,87 +298,76 @@ contains
   subroutine both_sides_alike()
     real(wp), parameter :: edges(2) = [0.04_wp, 0.035_wp]   !! in cells of 5 mm
     real(wp), parameter :: little(3) = [0.0_wp, 3.0e-6_wp, -3.0e-6_wp]   !! [cells]
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    real(wp) :: x(3)
-    logical :: inside, open, links
+    logical :: alike(3)
     integer :: e, m, i
 
-    grid = make_grid([20, 20, 20], [0.1_wp, 0.1_wp, 0.1_wp])
-    inside = .true.
-    open = .true.
-    links = .true.
+    call tank([20, 20, 20], [0.1_wp, 0.1_wp, 0.1_wp])
+    alike = .true.
     do e = 1, 2
       do m = 1, 3
-        x = [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp]
-        call make_body('cube', [edges(e)], x, identity, blocks)
-        call fill(grid, blocks, solid)
+        call put('cube', edges(e:e), [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp])
+        call fill()
         do i = 1, 20
-          inside = inside .and. all(solid%inside(i, 1:20, 1:20) &
-                                    == solid%inside(21 - i, 1:20, 1:20))
-          open = open .and. all(abs(solid%aperture(i, 1:20, 1:20, 1) &
-                                    - solid%aperture(22 - i, 1:20, 1:20, 1)) <= 0.0_wp)
-          links = links .and. all((solid%link_number(i, 1:20, 1:20, 1) > 0) &
-                                .eqv. (solid%link_number(22 - i, 1:20, 1:20, 1) > 0))
+          associate (w => solid%aperture, n => solid%link_number)
+            alike = alike .and. [ &
+              all(solid%inside(i, 1:20, 1:20) == solid%inside(21 - i, 1:20, 1:20)), &
+              all(abs(w(i, 1:20, 1:20, 1) - w(22 - i, 1:20, 1:20, 1)) <= 0.0_wp), &
+              all((n(i, 1:20, 1:20, 1) > 0) .eqv. (n(22 - i, 1:20, 1:20, 1) > 0))]
+          end associate
         end do
       end do
     end do
-    call check('both sides alike: centres inside', inside)
-    call check('both sides alike: open faces', open)
-    call check('both sides alike: links', links)
+    call check('both sides alike: centres inside', alike(1))
+    call check('both sides alike: open faces', alike(2))
+    call check('both sides alike: links', alike(3))
   end subroutine both_sides_alike
 
   !> Corners, edges and sides on grid planes and cell centres, or nearly: volume, open and solid
   !! share of each face, a hit on every link between inside and outside.
   subroutine degenerate_poses()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
     real(wp), parameter :: angle(8) = [pi*[0.0_wp, 0.25_wp, 0.5_wp, 0.75_wp, 1.0_wp, 0.2_wp], &
-                                       pi/6, atan(sqrt(0.5_wp))]
+      pi/6, atan(sqrt(0.5_wp))]
     real(wp), parameter :: shift(8) = [0.0_wp, 0.5_wp, 0.25_wp, 1e-13_wp, -1e-12_wp, 1e-10_wp, &
-                                       1.0_wp/3, -1e-7_wp]
+      1.0_wp/3, -1e-7_wp]
     real(wp) :: q(4), x(3), worst(2)
-    integer :: p, i, complete
+    integer :: p, i, missing
     logical :: closed
 
-    grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
+    call tank([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
     worst = 0.0_wp
-    complete = 0
+    missing = 0
     closed = .true.
     do p = 1, 90
       q = identity
       do i = 1, 3
         q = quaternion_product(quaternion_from_axis(real(unit_step(:, 1 + int(3*draw())), wp), &
-                                                    angle(1 + int(8*draw()))), q)
+          angle(1 + int(8*draw()))), q)
         x(i) = 0.005_wp*(8 + shift(1 + int(8*draw())))
       end do
       select case (mod(p, 3))
-      case (0)
-        call make_body('hexapod', [d], x, q, blocks)
-      case (1)
-        call make_body('box', [0.02_wp, 0.03_wp, 0.0075_wp], x, q, blocks)
-      case default
-        call make_body('sphere', [0.04_wp], x, q, blocks)
+      case (0); call put('hexapod', [d], x, q)
+      case (1); call put('box', [0.02_wp, 0.03_wp, 0.0075_wp], x, q)
+      case default; call put('sphere', [0.04_wp], x, q)
       end select
-      call fill(grid, blocks, solid)
+      call fill()
       worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
-      worst(2) = max(worst(2), largest_gap(solid))
-      complete = complete + links_without_hit(grid, solid)
-      closed = closed .and. full_cells_closed(grid, solid)
+      worst(2) = max(worst(2), largest_gap())
+      missing = missing + links_without_hit()
+      associate (w => solid%aperture)
+        closed = closed .and. all(solid%alpha(1:16, 1:16, 1:16) < 1 &
+          .or. sum(w(1:16, 1:16, 1:16, :), 4) + w(2:17, 1:16, 1:16, 1) &
+          + w(1:16, 2:17, 1:16, 2) + w(1:16, 1:16, 2:17, 3) <= 0)
+      end associate
     end do
     ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
     call check('degenerate: volume', worst(1), 0.0_wp, 1e-5_wp)
     call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
     call check('degenerate: full cells are closed all round', closed)
-    call check('degenerate: links between inside and outside without a hit', complete, 0)
+    call check('degenerate: links between inside and outside without a hit', missing, 0)
   end subroutine degenerate_poses
 
   !> Largest |1 - open - sum of the shares of the bodies| of a face.
-  function largest_gap(solid) result(gap)
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp) :: gap
+  real(wp) function largest_gap()
     real(wp), allocatable :: rest(:, :, :, :)
     integer :: m
 
@@ -431,86 +377,51 @@ contains
         rest(f(1), f(2), f(3), f(4)) = rest(f(1), f(2), f(3), f(4)) + solid%face_beta(m)
       end associate
     end do
-    gap = maxval(abs(rest - 1))
+    largest_gap = maxval(abs(rest - 1))
   end function largest_gap
 
-  pure logical function full_cells_closed(grid, solid)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer :: i, j, k
+  integer function links_without_hit()
+    integer :: m, a(3), b(3)
 
-    full_cells_closed = .true.
-    do k = 1, grid%n(3)
-      do j = 1, grid%n(2)
-        do i = 1, grid%n(1)
-          if (solid%alpha(i, j, k) < 1) cycle
-          full_cells_closed = full_cells_closed .and. all(solid%aperture(i, j, k, :) <= 0) .and. &
-                              solid%aperture(i + 1, j, k, 1) <= 0 .and. &
-                              solid%aperture(i, j + 1, k, 2) <= 0 .and. &
-                              solid%aperture(i, j, k + 1, 3) <= 0
-        end do
-      end do
-    end do
-  end function full_cells_closed
-
-  function links_without_hit(grid, solid) result(n)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer :: n, i, j, k, m, low(3)
-
-    n = 0
+    links_without_hit = 0
     do m = 1, 3
-      do k = 2, grid%n(3)
-        do j = 2, grid%n(2)
-          do i = 2, grid%n(1)
-            low = [i, j, k] - unit_step(:, m)
-            if (solid%link_number(i, j, k, m) > 0) cycle
-            if (solid%inside(i, j, k) /= solid%inside(low(1), low(2), low(3))) n = n + 1
-          end do
-        end do
-      end do
+      a = 2 - unit_step(:, m)
+      b = grid%n - unit_step(:, m)
+      links_without_hit = links_without_hit + count(solid%link_number(2:16, 2:16, 2:16, m) <= 0 &
+        .and. solid%inside(2:16, 2:16, 2:16) /= solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)))
     end do
   end function links_without_hit
 
   !> The pose of the fixed blocks: three corners on the floor, nothing below it.
   subroutine three_links_on_the_floor()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    real(wp) :: q(4)
-
-    grid = make_grid([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp])
-    q = normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp])
-    call make_body('hexapod', [d], [0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], q, blocks)
-    call fill(grid, blocks, solid)
+    call tank([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp])
+    call put('hexapod', [d], [0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], &
+      normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp]))
+    call fill()
     call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
-               1e-7_wp*d**3)
+      1e-7_wp*d**3)
     call check('three links: the floor is open', minval(solid%aperture(1:60, 1:20, 1, 3)), 1.0_wp, &
-               1e-6_wp)
+      1e-6_wp)
     call check('three links: no pockets', solid%n_sealed, 0)
   end subroutine three_links_on_the_floor
 
   !> Hits against the exact intersections of grid lines with a turned box.
   subroutine links_of_a_box()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
     type(links_t) :: links
     real(wp) :: worst, r(3, 3), a(3), b(3), enter, leave, e(3)
     integer :: p, i, j, k, m, n(3)
     logical :: same, flags
-    real(wp), parameter :: size_m(3) = [0.012_wp, 0.025_wp, 0.033_wp]
 
-    grid = make_grid([16, 14, 12], [0.08_wp, 0.056_wp, 0.072_wp])
+    call tank([16, 14, 12], [0.08_wp, 0.056_wp, 0.072_wp])
     worst = 0.0_wp
     same = .true.
     flags = .true.
     do p = 1, 20
-      call make_body('box', size_m, [0.04_wp, 0.028_wp, 0.036_wp] + 0.004_wp*[draw(), draw(), &
-                     draw()], draw_attitude(), blocks)
+      call put('box', [0.012_wp, 0.025_wp, 0.033_wp], [0.04_wp, 0.028_wp, 0.036_wp] &
+        + 0.004_wp*[draw(), draw(), draw()], draw_attitude())
       if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
       e = maxval(blocks%shapes(1)%point, 2)
-      call fill(grid, blocks, solid)
+      call fill()
       links = links_on_grid(solid)
       r = transpose(rotation_matrix(blocks%q(:, 1)))
       do k = 1, grid%n(3)
@@ -523,11 +434,11 @@ contains
               if (n(m) < 1) cycle
               a = matmul(r, grid%centre(n, [1, 2, 3]) - blocks%x(:, 1))
               call cross_box(a, b, e, enter, leave)
-              same = same .and. ((enter <= 1) .eqv. (links%low(i, j, k, m) <= 1)) .and. &
-                     ((enter <= 1) .eqv. (links%body_high(i, j, k, m) == 1))
+              same = same .and. all((enter <= 1) .eqv. [links%low(i, j, k, m) <= 1, &
+                links%body_high(i, j, k, m) == 1])
               if (enter > 1 .or. links%low(i, j, k, m) > 1) cycle
               worst = max(worst, abs(links%low(i, j, k, m) - max(enter, 1e-3_wp)), &
-                          abs(links%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
+                abs(links%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
             end do
           end do
         end do
@@ -568,137 +479,106 @@ contains
 
   !> A box through the open top: what is outside the domain is not in the grid.
   subroutine partly_outside()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-
-    grid = make_grid([10, 10, 10], [0.05_wp, 0.05_wp, 0.05_wp])
-    call make_body('box', [0.01_wp, 0.01_wp, 0.02_wp], [0.0275_wp, 0.0275_wp, 0.05_wp], identity, &
-                   blocks)
-    call fill(grid, blocks, solid)
+    call tank([10, 10, 10], [0.05_wp, 0.05_wp, 0.05_wp])
+    call put('box', [0.01_wp, 0.01_wp, 0.02_wp], [0.0275_wp, 0.0275_wp, 0.05_wp])
+    call fill()
     call check('half outside: half the volume', sum(solid%alpha)*grid%volume, 1e-6_wp, 1e-18_wp)
-    call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp, 0.0_wp)
+    call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp)
     call check('half outside: solid share of the side', &
-               sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
-    call check('half outside: lists end at the side', &
-               maxval(solid%face(3, 1:solid%body_face(2) - 1)) == 11 .and. &
-               maxval(solid%cell(3, 1:solid%body_cell(2) - 1)) == 10)
+      sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
+    call check('half outside: faces end at the side', &
+      maxval(solid%face(3, 1:solid%body_face(2) - 1)), 11)
+    call check('half outside: so do cells', maxval(solid%cell(3, 1:solid%body_cell(2) - 1)), 10)
     call check('half outside: no link beyond the side', all(solid%link_number(:, :, 11:, 3) == 0))
     blocks%x(3, 1) = 0.049_wp - 0.01_wp   ! its top 1 mm below the side
-    call fill(grid, blocks, solid)
+    call fill()
     call check('below the side: link from the last centre', &
-               solid%link_length(1, solid%link_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
+      solid%link_length(1, solid%link_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
   end subroutine partly_outside
 
   !> Two boxes that overlap by half a cell, and two that share a cell without overlap.
   subroutine bodies_in_contact()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    real(wp) :: x(3, 2), q(4, 2), beta
+    real(wp) :: beta
     integer :: m
 
-    grid = make_grid([20, 10, 10], [0.1_wp, 0.05_wp, 0.05_wp])
-    q = spread(identity, 2, 2)
-    x(:, 1) = [0.035_wp, 0.025_wp, 0.025_wp]
-    x(:, 2) = [0.0525_wp, 0.025_wp, 0.025_wp]    ! 2.5 mm into the other
-    call make_bodies('cube', [0.02_wp, 0.0_wp, 0.0_wp], x, q, blocks)
-    call fill(grid, blocks, solid)
-    call check('overlap: shares of a cell end at one', maxval(solid%alpha), 1.0_wp, 0.0_wp)
+    call tank([20, 10, 10], [0.1_wp, 0.05_wp, 0.05_wp])   ! 2.5 mm into the other
+    call put('cube', [0.02_wp], [0.035_wp, 0.025_wp, 0.025_wp, 0.0525_wp, 0.025_wp, 0.025_wp])
+    call fill()
+    call check('overlap: shares of a cell end at one', maxval(solid%alpha), 1.0_wp)
     call check('overlap: each body keeps its volume', &
-               sum(solid%cell_alpha(:solid%body_cell(3) - 1))*grid%volume, 1.6e-5_wp, 1e-17_wp)
+      sum(solid%cell_alpha(:solid%body_cell(3) - 1))*grid%volume, 1.6e-5_wp, 1e-17_wp)
     beta = 0.0_wp
     do m = 1, solid%body_face(3) - 1
       if (all(solid%face(:, m) == [9, 5, 5, 2])) beta = beta + solid%face_beta(m)
     end do
     call check('overlap: shares of a closed face are scaled to one', beta, 1.0_wp, 1e-15_wp)
-    call check('overlap: nothing is open below zero', minval(solid%aperture), 0.0_wp, 0.0_wp)
-    x(1, :) = [0.0375_wp, 0.0575_wp]             ! side by side at x = 47.5 mm, within cell 10
-    call make_bodies('cube', [0.02_wp, 0.0_wp, 0.0_wp], x, q, blocks)
-    call fill(grid, blocks, solid)
-    call check('side by side: the shared cell is full', solid%alpha(10, 5, 5), 1.0_wp, 0.0_wp)
+    call check('overlap: nothing is open below zero', minval(solid%aperture), 0.0_wp)
+    blocks%x(1, :) = [0.0375_wp, 0.0575_wp]   ! side by side at x = 47.5 mm, within cell 10
+    call fill()
+    call check('side by side: the shared cell is full', solid%alpha(10, 5, 5), 1.0_wp)
     call check('side by side: and is no cut cell', solid%cut(10, 5, 5), 0)
-    call check('side by side: its faces are closed', solid%aperture(10, 5, 5, 2), 0.0_wp, 0.0_wp)
+    call check('side by side: its faces are closed', solid%aperture(10, 5, 5, 2), 0.0_wp)
     call check('side by side: the centre belongs to one of them', solid%inside(10, 5, 5) > 0)
   end subroutine bodies_in_contact
 
-  !> A lid on a well of 2 x 2 cells: closed off, unless the floor is an open side.
+  !> A lid on a well of 2 x 2 cells, 7..8 x 7..8, down to half a cell above the floor, between four
+  !! cubes of 4 cells: closed off, unless the floor is an open side.
   subroutine sealed_pocket()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid
-    real(wp) :: x(3, 5), q(4, 5)
-    integer :: m
-
-    grid = make_grid([14, 14, 10], [0.14_wp, 0.14_wp, 0.1_wp])
-    q = spread(identity, 2, 5)
-    x(:, 1) = [0.04_wp, 0.06_wp, 0.02_wp]    ! four cubes of 4 cells around the well 7..8 x 7..8
-    x(:, 2) = [0.1_wp, 0.08_wp, 0.02_wp]
-    x(:, 3) = [0.08_wp, 0.04_wp, 0.02_wp]
-    x(:, 4) = [0.06_wp, 0.1_wp, 0.02_wp]
-    x(:, 5) = [0.07_wp, 0.07_wp, 0.025_wp]   ! the lid, down to half a cell above the floor
-    call make_bodies('cube', [0.04_wp, 0.0_wp, 0.0_wp], x, q, blocks)
-    call fill(grid, blocks, solid)
+    call tank([14, 14, 10], [0.14_wp, 0.14_wp, 0.1_wp])
+    call put('cube', [0.04_wp], [0.04_wp, 0.06_wp, 0.02_wp, 0.1_wp, 0.08_wp, 0.02_wp, 0.08_wp, &
+      0.04_wp, 0.02_wp, 0.06_wp, 0.1_wp, 0.02_wp, 0.07_wp, 0.07_wp, 0.025_wp])
+    call fill()
     call check('pocket: four cells are sealed', solid%n_sealed, 4)
-    call check('pocket: their faces are closed', maxval(solid%aperture(7:8, 7:8, 1, :)), 0.0_wp, &
-               0.0_wp)
-    call check('pocket: other cells are open', solid%aperture(2, 2, 1, 1), 1.0_wp, 0.0_wp)
+    call check('pocket: their faces are closed', maxval(solid%aperture(7:8, 7:8, 1, :)), 0.0_wp)
+    call check('pocket: other cells are open', solid%aperture(2, 2, 1, 1), 1.0_wp)
     grid%side(1, 3) = side_open
-    call fill(grid, blocks, solid)
+    call fill()
     call check('pocket: open through the floor', solid%n_sealed, 0)
     grid%side(1, 3) = side_no_slip
-    blocks%x(1, 1) = 0.03_wp                 ! one wall gone: a way out
-    call fill(grid, blocks, solid)
+    blocks%x(1, 1) = 0.03_wp   ! one wall gone: a way out
+    call fill()
     call check('pocket: a gap lets it out', solid%n_sealed, 0)
-    do m = 1, 5
-      blocks%present(m) = m < 5
-    end do
-    call fill(grid, blocks, solid)
+    blocks%present(5) = .false.
+    call fill()
     call check('pocket: a body not present is not there', solid%body_cell(6), solid%body_cell(5))
   end subroutine sealed_pocket
 
   !> A body across periodic sides, and the same body three periods away: the same bits.
   subroutine periods()
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks, far
-    type(solid_geometry_t) :: solid, other
+    type(solid_geometry_t) :: other
     type(links_t) :: links
     real(wp) :: worst
     integer :: i, m
 
-    grid = make_grid([24, 24, 24], [0.09375_wp, 0.09375_wp, 0.09375_wp])   ! h = 1/256: exact shifts
+    call tank([24, 24, 24], [0.09375_wp, 0.09375_wp, 0.09375_wp])   ! h = 1/256: exact shifts
     grid%periodic = [.true., .false., .true.]
-    grid%side(:, 1) = side_periodic
-    grid%side(:, 3) = side_periodic
-    call make_body('hexapod', [0.015_wp], [0.0078125_wp, 0.05_wp, 0.09_wp], draw_attitude(), blocks)
-    far = blocks
-    far%x(1, 1) = far%x(1, 1) - 3*grid%length(1)
-    call fill(grid, blocks, solid)
-    call fill(grid, far, other)
+    grid%side(:, [1, 3]) = side_periodic
+    call put('hexapod', [0.015_wp], [0.0078125_wp, 0.05_wp, 0.09_wp], draw_attitude())
+    call fill()
+    blocks%x(1, 1) = blocks%x(1, 1) - 3*grid%length(1)
+    call fill_other(other)
     links = links_on_grid(solid)
     call check('periods: the whole volume', sum(solid%alpha(1:24, 1:24, 1:24))*grid%volume, &
-               7*0.015_wp**3, 1e-12_wp*0.015_wp**3)
+      7*0.015_wp**3, 1e-12_wp*0.015_wp**3)
     worst = 0.0_wp
     do i = 1, n_halo
       worst = max(worst, maxval(abs(solid%alpha(i, :, :) - solid%alpha(24 + i, :, :))), &
-                  maxval(abs(solid%aperture(:, :, i, :) - solid%aperture(:, :, 24 + i, :))), &
-                  maxval(abs(links%low(1 - i, :, 4:20, :) - links%low(25 - i, :, 4:20, :))))
+        maxval(abs(solid%aperture(:, :, i, :) - solid%aperture(:, :, 24 + i, :))), &
+        maxval(abs(links%low(1 - i, :, 4:20, :) - links%low(25 - i, :, 4:20, :))))
     end do
-    call check('periods: halos are images, bit by bit', worst, 0.0_wp, 0.0_wp)
+    call check('periods: halos are images, bit by bit', worst, 0.0_wp)
     call check('periods: three periods away the same bits', same_bits(solid, other))
     worst = 0.0_wp
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m))
-        worst = max(worst, abs(volume_of_tets(grid, solid, m) - solid%alpha(c(1), c(2), c(3))))
+        worst = max(worst, abs(volume_of_tets(m) - solid%alpha(c(1), c(2), c(3))))
       end associate
     end do
     call check('periods: the tetrahedra listed fill the cut cells', worst, 0.0_wp, 1e-12_wp)
   end subroutine periods
 
   !> Share of cut cell m by its list of tetrahedra.
-  function volume_of_tets(grid, solid, m) result(share)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
+  function volume_of_tets(m) result(share)
     integer, intent(in) :: m
     real(wp) :: share, v, moment(3), low(3)
     type(polyhedron_t) :: p
@@ -722,52 +602,48 @@ contains
 
     of_a = links_on_grid(a)
     of_b = links_on_grid(b)
-    same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. &
-           maxval(abs(a%aperture - b%aperture)) <= 0 .and. &
-           maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) <= 0 &
-           .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) .and. &
-           all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
+    same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. maxval(abs(a%aperture - b%aperture)) &
+      <= 0 .and. maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) &
+      <= 0 .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) &
+      .and. all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
   end function same_bits
 
   !> Two geometries in turn; one of three bodies only turns, only moves, only comes or goes, or
   !! nothing does: nothing of the old places is left.
   subroutine filled_if_moved()
     real(wp), parameter :: mark = 0.25_wp
-    type(grid_t) :: grid
-    type(blocks_t) :: blocks
-    type(solid_geometry_t) :: solid(2), fresh
+    type(solid_geometry_t) :: in_turn(2)
     type(solid_fraction_t) :: fraction
     integer :: s, turn, b
     logical :: same
 
-    grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
-    call make_bodies('hexapod', [0.015_wp], reshape([0.03_wp, 0.04_wp, 0.03_wp, 0.05_wp, 0.04_wp, &
-      0.05_wp, 0.02_wp, 0.07_wp, 0.09_wp], [3, 3]), spread(identity, 2, 3), blocks)
+    call tank([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
+    call put('hexapod', [0.015_wp], [0.03_wp, 0.04_wp, 0.03_wp, 0.05_wp, 0.04_wp, 0.05_wp, &
+      0.02_wp, 0.07_wp, 0.09_wp])
     call solid_fraction_init(grid, blocks, fraction)
-    call solid_geometry_init(grid, solid(1), 3)
-    call solid_geometry_init(grid, solid(2), 3)
+    call solid_geometry_init(grid, in_turn(1), 3)
+    call solid_geometry_init(grid, in_turn(2), 3)
     same = .true.
     turn = 1
     do s = 1, 24
       b = 1 + mod(s/8, 3)
-      select case (mod(s/2, 4))   ! the second of two is as the first
-      case (1)
-        if (mod(s, 2) == 0) blocks%q(:, b) = draw_attitude()
-      case (2)
-        if (mod(s, 2) == 0) blocks%x(:, b) = blocks%x(:, b) + [0.003_wp, 0.0_wp, -0.002_wp]
-      case default
-        if (mod(s, 2) == 0) blocks%present(b) = .not. blocks%present(b)
-      end select
+      if (mod(s, 2) == 0) then   ! the second of two is as the first
+        select case (mod(s/2, 4))
+        case (1); blocks%q(:, b) = draw_attitude()
+        case (2); blocks%x(:, b) = blocks%x(:, b) + [0.003_wp, 0.0_wp, -0.002_wp]
+        case default; blocks%present(b) = .not. blocks%present(b)
+        end select
+      end if
       turn = 3 - turn
-      call update_solid(fraction, grid, blocks, solid(turn))
-      call fill(grid, blocks, fresh)
-      same = same .and. same_bits(solid(turn), fresh)
+      call update_solid(fraction, grid, blocks, in_turn(turn))
+      call fill()
+      same = same .and. same_bits(in_turn(turn), solid)
     end do
     call check('one thing at a time: as if filled afresh', same)
-    call update_solid(fraction, grid, blocks, solid(1))
-    solid(1)%alpha(1, 1, 1) = mark
-    call update_solid(fraction, grid, blocks, solid(1))
-    call check('nothing moved: nothing filled', solid(1)%alpha(1, 1, 1), mark, 0.0_wp)
+    call update_solid(fraction, grid, blocks, in_turn(1))
+    in_turn(1)%alpha(1, 1, 1) = mark
+    call update_solid(fraction, grid, blocks, in_turn(1))
+    call check('nothing moved: nothing filled', in_turn(1)%alpha(1, 1, 1), mark)
   end subroutine filled_if_moved
 
 end module test_solid_fraction_m

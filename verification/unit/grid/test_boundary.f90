@@ -57,14 +57,10 @@ contains
                 1 - n_halo:cells(3) + n_halo, 3), source=-1.0e30_wp)
     allocate (a(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                 1 - n_halo:cells(3) + n_halo), source=-1.0e30_wp)
-    do k = 1, cells(3)
-      do j = 1, cells(2)
-        do i = 1, cells(1)
-          a(i, j, k) = original([i, j, k], 1)
-          do c = 1, 3
-            u(i, j, k, c) = original([i, j, k], c)
-          end do
-        end do
+    do concurrent (k=1:cells(3), j=1:cells(2), i=1:cells(1))
+      a(i, j, k) = original([i, j, k], 1)
+      do c = 1, 3
+        u(i, j, k, c) = original([i, j, k], c)
       end do
     end do
     call fill_scalar_halo(grid, a)
@@ -83,12 +79,12 @@ contains
         end do
       end do
     end do
-    call check(name//': cells of the domain keep their values', inside, 0.0_wp, 0.0_wp)
+    call check(name//': cells of the domain keep their values', inside, 0.0_wp)
     u = -1.0e30_wp
     call set_side_velocity(grid, u)
-    call check(name//': normal velocity of the sides', side_errors(grid, u), 0.0_wp, 0.0_wp)
-    call check(name//': scalar', worst(1), 0.0_wp, 0.0_wp)
-    call check(name//': velocity', worst(2), 0.0_wp, 0.0_wp)
+    call check(name//': normal velocity of the sides', side_errors(grid, u), 0.0_wp)
+    call check(name//': scalar', worst(1), 0.0_wp)
+    call check(name//': velocity', worst(2), 0.0_wp)
   end subroutine all_halos
 
   !> Largest error of the face velocity where a side gives it; elsewhere it must be untouched.

@@ -87,13 +87,9 @@ contains
     integer :: i, j, k, m, n, d
 
     call build(closed, middle, .true.)
-    do k = 1, cells(3)
-      do j = 1, cells(2)
-        do i = 1, cells(1)
-          box%flow%p(i, j, k) = 50.0_wp + dot_product(gradient, box%grid%centre([i, j, k], &
-                                                                               [1, 2, 3]))
-        end do
-      end do
+    do concurrent (k=1:cells(3), j=1:cells(2), i=1:cells(1))
+      box%flow%p(i, j, k) = 50.0_wp + dot_product(gradient, box%grid%centre([i, j, k], &
+                                                                           [1, 2, 3]))
     end do
     call force_from_faces(box%grid, box%bodies, flux, box%flow%p, force)
     expected = 0.0_wp
@@ -210,7 +206,7 @@ contains
       pushed = max(pushed, maxval(abs(flux%s(:, m))))
     end do
     call check('the box covers part of the wall', n > 0)
-    call check('nothing is pushed through a wall', pushed, 0.0_wp, 0.0_wp)
+    call check('nothing is pushed through a wall', pushed, 0.0_wp)
 
     call build(periodic, [middle(1), middle(2), 0.14_wp], .false.)
     box%flow%p = 7.0_wp

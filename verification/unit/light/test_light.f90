@@ -162,8 +162,7 @@ contains
     want = -(s - 1.0_wp)*g/(s + world%light%added(1)%mass)
     call check('start of a fall', abs(world%blocks%v(3, 1)/dt/want - 1.0_wp) < 1.0e-5_wp)
     call check('M dU/dt is the sum of forces', abs(own_mass(world%blocks, 1)*(world%blocks%v(3, &
-      1)/dt + g) &
-      - world%blocks%fluid_force(3, 1)) < 1.0e-12_wp*own_mass(world%blocks, 1)*g)
+      1)/dt + g) - world%blocks%fluid_force(3, 1)) < 1.0e-12_wp*own_mass(world%blocks, 1)*g)
     call check('shares in the added mass', abs(world%blocks%mass(1)/own_mass(world%blocks, 1) &
       - 1.0_wp - world%light%added(1)%mass/s) < 1.0e-12_wp)
   end subroutine check_start
@@ -300,8 +299,7 @@ contains
     do i = 1, 50
       call step(1.0e-3_wp, world)
     end do
-    call check('energy under water stays', &
-               abs(energy(world)/first - 1.0_wp) < 1.0e-12_wp)
+    call check('energy under water stays', abs(energy(world)/first - 1.0_wp) < 1.0e-12_wp)
     call start(0.9_wp*rho, world, [level - 0.35_wp*edge])   ! at rest at -0.4
     largest = 0.0_wp
     do i = 1, 1000
@@ -374,9 +372,8 @@ contains
       call step(1.0e-3_wp, world)
       call step(1.0e-3_wp, again)
     end do
-    call check('a restart goes on as it would have', &
-      all(abs(again%blocks%v - world%blocks%v) <= 0.0_wp) &
-      .and. all(abs(again%blocks%fluid_force - world%blocks%fluid_force) <= 0.0_wp))
+    call check('a restart goes on as it would have', all(abs(again%blocks%v - world%blocks%v) &
+      <= 0.0_wp) .and. all(abs(again%blocks%fluid_force - world%blocks%fluid_force) <= 0.0_wp))
     call check('in the middle of an entry', world%light%wet(1) > 0.0_wp)
   end subroutine check_resumed
 

@@ -99,7 +99,7 @@ contains
     call open_constant(cut, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp, c)
     call check('and still a plane', c >= 0.0_wp .and. c <= 1.0_wp)
     call load_cut_cell(solid, 0, low, h, cut)
-    call check('no body, all open', cut%open, 1.0_wp, 0.0_wp)
+    call check('no body, all open', cut%open, 1.0_wp)
   end subroutine cell_without_open_part
 
 end module test_cut_cell_m

@@ -54,12 +54,12 @@ contains
     volumes%q(:, :, layer:layer + 1, 3) = 0.3_wp
     call sweep_volumes(grid, solid, 3, volumes, sweeps)
     call check('up: from the surface', volumes%g(2, 2, layer + 1, 3), expected, close)
-    call check('up: from below', volumes%g(2, 2, layer, 3), 0.3_wp, 0.0_wp)
+    call check('up: from below', volumes%g(2, 2, layer, 3), 0.3_wp)
     call check('up: liquid of the surface', volumes%w(2, 2, layer), share + 0.3_wp - expected, &
                close)
     call check('up: room', volumes%v(2, 2, layer - 1:layer + 1), [0.7_wp, 1.0_wp, 1.3_wp], close)
     call check('up: nothing is lost', sum(volumes%w(1:4, 1:3, 1:6)), before, 100*close)
-    call check('up: before the sweep', volumes%w_before(2, 2, layer), share, 0.0_wp)
+    call check('up: before the sweep', volumes%w_before(2, 2, layer), share)
     call check('up: running share', volumes%c(2, 2, layer), volumes%w(2, 2, layer), close)
   end subroutine upward
 
@@ -77,7 +77,7 @@ contains
     volumes%q(2:4, :, :, 1) = 0.25_wp
     call sweep_volumes(grid, solid, 1, volumes, sweeps)
     call check('sideways: a level slab', volumes%g(3, 2, layer, 1), 0.1_wp, close)
-    call check('sideways: pure cells', volumes%g(3, 2, [1, 6], 1), [0.25_wp, 0.0_wp], 0.0_wp)
+    call check('sideways: pure cells', volumes%g(3, 2, [1, 6], 1), [0.25_wp, 0.0_wp])
   end subroutine sideways
 
   !> An inflow brings liquid below its level, an outflow gives back what stands beside it.

@@ -135,12 +135,8 @@ contains
 
     call start([24, 16, 20], spread(0.24_wp, 1, 3), .not. walls, nothing, nothing, -1.0_wp, &
                [water_t ::])
-    do k = 1, grid%n(3)
-      do j = 1, grid%n(2)
-        do i = 1, grid%n(1)
-          flow%liquid(i, j, k) = grid%volume*ball_share([i, j, k])
-        end do
-      end do
+    do concurrent (k=1:grid%n(3), j=1:grid%n(2), i=1:grid%n(1))
+      flow%liquid(i, j, k) = grid%volume*ball_share([i, j, k])
     end do
     call extend_fraction(grid, new, transport%extension, flow)
     flow%uf(:, :, :, 1) = 0.24_wp
@@ -173,7 +169,7 @@ contains
   end subroutine one_turn
 
   !> Share of a ball of radius 0.06 m in the middle, by points.
-  function ball_share(at) result(share)
+  pure function ball_share(at) result(share)
     integer, intent(in) :: at(3)
     real(wp) :: share
     integer, parameter :: n = 8
@@ -200,12 +196,10 @@ contains
 
     call start([32, 4, 32], [0.32_wp, 0.04_wp, 0.32_wp], [.false., .true., .false.], nothing, &
                nothing, -1.0_wp, [water_t([0.13_wp, 0.0_wp, 0.05_wp], [0.19_wp, 0.04_wp, 0.21_wp])])
-    do k = grid%lo(3), grid%hi(3) + 1
-      do i = grid%lo(1), grid%hi(1) + 1
-        x = [grid%face(i, 1), grid%face(k, 3)]
-        flow%uf(i, :, k, 1) = (stream(x + [0.0_wp, grid%h(3)]) - stream(x))/grid%h(3)
-        flow%uf(i, :, k, 3) = (stream(x) - stream(x + [grid%h(1), 0.0_wp]))/grid%h(1)
-      end do
+    do concurrent (k=grid%lo(3):grid%hi(3) + 1, i=grid%lo(1):grid%hi(1) + 1)
+      x = [grid%face(i, 1), grid%face(k, 3)]
+      flow%uf(i, :, k, 1) = (stream(x + [0.0_wp, grid%h(3)]) - stream(x))/grid%h(3)
+      flow%uf(i, :, k, 3) = (stream(x) - stream(x + [grid%h(1), 0.0_wp]))/grid%h(1)
     end do
     call one_turn('rotation', 160)
   end subroutine column_in_rotation
@@ -276,7 +270,7 @@ contains
       call carry_box(step, [0.0771_wp, 0.0613_wp, 0.15_wp + 0.0031_wp*real(step, wp)])
     end do
     call check_books('box leaves')
-    call check('box leaves: no liquid through the top', flow%liquid_inflow, 0.0_wp, 0.0_wp)
+    call check('box leaves: no liquid through the top', flow%liquid_inflow, 0.0_wp)
   end subroutine box_leaves_through_the_top
 
   !> A turning hexapod dips into the water and comes out again, fluid moved by the correction alone.
@@ -350,7 +344,7 @@ contains
     call check('two basins: each keeps its liquid', worst, 0.0_wp, 1.0e-13_wp)
     call check('two basins: parts of the band', transport%flux%band%parts >= 2)
     call check('two basins: level of the right one stands', &
-               maxval(flow%c(11:16, 1:12, 7)) - minval(flow%c(11:16, 1:12, 7)), 0.0_wp, 0.0_wp)
+      maxval(flow%c(11:16, 1:12, 7)) - minval(flow%c(11:16, 1:12, 7)), 0.0_wp)
   end subroutine two_basins
 
 end module test_liquid_transport_m

@@ -33,9 +33,9 @@ contains
     call check('tank: few iterations', flux%iterations <= 10)   ! 9
     call check('tank: one part', flux%band%parts, 1)
     call check('tank: balance of the band', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
-    call check('tank: flux of the velocity elsewhere', q(2, 9, 9, 1), &
-               dt*grid%area(1)*flow%uf(2, 9, 9, 1), 0.0_wp)
-    call check('tank: none through walls', maxval(abs(q(1, 1:9, 1:10, 1))), 0.0_wp, 0.0_wp)
+    call check('tank: flux of the velocity elsewhere', &
+      q(2, 9, 9, 1), dt*grid%area(1)*flow%uf(2, 9, 9, 1))
+    call check('tank: none through walls', q(1, 1:9, 1:10, 1), 0.0_wp)
 
     call start(.true.)
     call find_flux(new)
@@ -48,7 +48,7 @@ contains
     call start(.false.)
     call stand_on_floor()
     call find_flux(new)
-    call check('stopped by the floor: told', flux%unmatched, 0.0_wp, 0.0_wp)
+    call check('stopped by the floor: told', flux%unmatched, 0.0_wp)
     call check('stopped by the floor: the whole tank is the band', &
                all(flux%band%marked(1:8, 1:9, 1:10) == 1))
     call check('stopped by the floor: balance', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
@@ -116,14 +116,8 @@ contains
     call open_flux_init(grid, flux)
     call elliptic_solver_init(grid, solver)
     flow%fluid_volume = grid%volume*(1.0_wp - old%alpha)
-    do d = 1, 3
-      do k = 1, 11
-        do j = 1, 10
-          do i = 1, 9
-            if (.not. closed) flow%uf(i, j, k, d) = uniform(d, i, j + 20*k) - 0.5_wp
-          end do
-        end do
-      end do
+    do concurrent (d=1:3, k=1:11, j=1:10, i=1:9)
+      if (.not. closed) flow%uf(i, j, k, d) = uniform(d, i, j + 20*k) - 0.5_wp
     end do
     if (allocated(q)) deallocate (q)
     allocate (q, source=flow%uf)

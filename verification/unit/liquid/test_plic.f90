@@ -73,9 +73,8 @@ contains
     call check('plane parallel to a face', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), &
                0.75_wp, 1.0e-15_wp)
     call check('wedge', unit_volume([0.25_wp, 0.75_wp, 0.0_wp], 0.5_wp), 0.5_wp, 1.0e-15_wp)
-    call check('box of edges 1, 2, 3', volume_below([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp, &
-                                                    [1.0_wp, 2.0_wp, 3.0_wp]), &
-               1.0_wp/6.0_wp, 1.0e-15_wp)
+    call check('box of edges 1, 2, 3', volume_below([1.0_wp, 1.0_wp, 1.0_wp], &
+      1.0_wp, [1.0_wp, 2.0_wp, 3.0_wp]), 1.0_wp/6.0_wp, 1.0e-15_wp)
     call check('constant of the plane through three corners', &
                unit_constant([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp/6.0_wp), 1.0_wp, 1.0e-14_wp)
   end subroutine against_exact_volumes
@@ -147,12 +146,8 @@ contains
     real(wp) :: c(3, 3, 3)
     integer :: i, j, k
 
-    do k = 1, 3
-      do j = 1, 3
-        do i = 1, 3
-          c(i, j, k) = unit_volume(n, d - dot_product(n, real([i, j, k] - 2, wp)))
-        end do
-      end do
+    do concurrent (k=1:3, j=1:3, i=1:3)
+      c(i, j, k) = unit_volume(n, d - dot_product(n, real([i, j, k] - 2, wp)))
     end do
   end function shares
 

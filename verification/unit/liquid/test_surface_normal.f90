@@ -29,9 +29,9 @@ contains
     call check('no gravity: no axis', vertical%axis, 0)
     vertical = vertical_of([1.0_wp, 0.0_wp, -9.81_wp])
     call check('main axis of gravity', vertical%axis, 3)
-    call check('up against gravity', vertical%up, up, 0.0_wp)
+    call check('up against gravity', vertical%up, up)
     vertical = vertical_of([2.0_wp, 0.0_wp, 0.0_wp])
-    call check('gravity along x', vertical%up, [-1.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
+    call check('gravity along x', vertical%up, [-1.0_wp, 0.0_wp, 0.0_wp])
     call check('slits are not looked through', .not. passable(1.0e-7_wp) .and. passable(1.0e-5_wp))
   end subroutine verticals
 
@@ -56,12 +56,10 @@ contains
 
     call still_water(grid, solid, c)
     vertical = vertical_of(-up)
-    call check('level', surface_normal(grid, solid, vertical, c, 4, 3, level), up, 0.0_wp)
-    call check('upside down', surface_normal(grid, solid, vertical, 1.0_wp - c, 4, 3, level), -up, &
-               0.0_wp)
+    call check('level', surface_normal(grid, solid, vertical, c, 4, 3, level), up)
+    call check('upside down', surface_normal(grid, solid, vertical, 1.0_wp - c, 4, 3, level), -up)
     c = 0.5_wp
-    call check('nothing to see: up', surface_normal(grid, solid, vertical, c, 4, 3, level), up, &
-               0.0_wp)
+    call check('nothing to see: up', surface_normal(grid, solid, vertical, c, 4, 3, level), up)
   end subroutine level_water
 
   !> Water stands higher behind a closed plane of faces; with one open face more it is seen.
@@ -75,8 +73,7 @@ contains
     c(5:, :, :) = 1.0_wp
     solid%aperture(5, :, :, 1) = 0.0_wp
     solid%alpha(5, 3, level) = 0.5_wp
-    call check('behind a wall', surface_normal(grid, solid, vertical_of(-up), c, 4, 3, level), up, &
-               0.0_wp)
+    call check('behind a wall', surface_normal(grid, solid, vertical_of(-up), c, 4, 3, level), up)
     solid%aperture(5, 3, level, 1) = 1.0_wp
     normal = surface_normal(grid, solid, vertical_of(-up), c, 4, 3, level)
     call check('through a hole in it', normal(1) < 0.0_wp)

@@ -94,11 +94,9 @@ contains
     real(wp), intent(in) :: speed, with_stream(3)
     integer :: i, k
 
-    do k = 1, grid%n(3) + 1
-      do i = 1, grid%n(1) + 1
-        flow%uf(i, :, k, 1) = with_stream(1) + (psi(speed, i, k + 1) - psi(speed, i, k))/grid%h(3)
-        flow%uf(i, :, k, 3) = with_stream(3) - (psi(speed, i + 1, k) - psi(speed, i, k))/grid%h(1)
-      end do
+    do concurrent (k=1:grid%n(3) + 1, i=1:grid%n(1) + 1)
+      flow%uf(i, :, k, 1) = with_stream(1) + (psi(speed, i, k + 1) - psi(speed, i, k))/grid%h(3)
+      flow%uf(i, :, k, 3) = with_stream(3) - (psi(speed, i + 1, k) - psi(speed, i, k))/grid%h(1)
     end do
     flow%uf(:, :, :, 2) = with_stream(2)
   end subroutine vortex
@@ -123,8 +121,7 @@ contains
     associate (n => grid%n)
       do d = 1, 3
         worst = max(worst, maxval(abs(flow%u(1:n(1), 1:n(2), 1:n(3), d) - stream(d)), &
-                                  mask=flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) &
-                                       > min_volume*grid%volume))
+          mask=flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) > min_volume*grid%volume))
       end do
     end associate
   end function deviation
@@ -136,8 +133,7 @@ contains
     integer :: step, d
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
-               [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], &
-               nothing, nothing)
+      [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], nothing, nothing)
     call vortex(0.2_wp, stream)
     do d = 1, 3
       flow%u(:, :, :, d) = stream(d)
@@ -157,16 +153,11 @@ contains
     integer :: i, j, k, step
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
-               [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], &
-               nothing, nothing)
+      [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], nothing, nothing)
     call vortex(0.2_wp, stream)
-    do k = 1, 12
-      do j = 1, 8
-        do i = 1, 16
-          flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), &
-                                cos(0.4_wp*i*j)]
-        end do
-      end do
+    do concurrent (k=1:12, j=1:8, i=1:16)
+      flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), &
+                            cos(0.4_wp*i*j)]
     end do
     call fill_velocity_halo(grid, flow%u)
     before = total_momentum()
@@ -186,8 +177,7 @@ contains
     associate (n => grid%n)
       do d = 1, 3
         p(d) = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
-                                flow%liquid(1:n(1), 1:n(2), 1:n(3))) &
-                   *flow%u(1:n(1), 1:n(2), 1:n(3), d))
+          flow%liquid(1:n(1), 1:n(2), 1:n(3)))*flow%u(1:n(1), 1:n(2), 1:n(3), d))
       end do
     end associate
   end function total_momentum

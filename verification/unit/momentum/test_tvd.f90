@@ -43,7 +43,7 @@ contains
     end do
     call check('between donor and next cell', inside)
     call check('extremum gives the donor', &
-               face_value(tvd_scheme, [0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]), 1.0_wp, 0.0_wp)
+      face_value(tvd_scheme, [0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]), 1.0_wp)
 
     call clipped()
   end subroutine test_tvd

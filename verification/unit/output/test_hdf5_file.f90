@@ -100,7 +100,7 @@ contains
     call check_file('datasets are written', file)
     call file%open(path, .false., .false.)
     call file%read('/a', b)
-    call check('reals come back bit by bit', b, [(2.0_wp/i, i=1, 6)], 0.0_wp)
+    call check('reals come back bit by bit', b, [(2.0_wp/i, i=1, 6)])
     call file%read('/n', n)
     call check('integers come back', all(n == [5, 6, 7, 8]))
     call file%read('/nothing', b(:0))
@@ -151,7 +151,7 @@ contains
     call table%find_rows(10, 11.0_wp)
     call check('rows are counted', table%rows == 11 .and. table%up_to_date)
     call table%read_row('/place', 7, x)
-    call check('a row comes back', x, 7 + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], 0.0_wp)
+    call check('a row comes back', x, 7 + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp])
     call table%file%read('/touched', touched)
     call check('integers come back', all(touched(13:14) == [7, -7]))
     call table%file%read('/cells', cells)
@@ -162,7 +162,7 @@ contains
     call list_columns(20, appending, table)
     call table%keep(9)
     call table%read_row('/place', 7, x)
-    call check('rows are dropped and others appended', x(2), 20.2_wp, 0.0_wp)
+    call check('rows are dropped and others appended', x(2), 20.2_wp)
     call table%read_row('/place', 8, x)
     call check('a row dropped does not come back', all(ieee_is_nan(x)))
     call table%file%shape_of('/nobody', found)
@@ -207,14 +207,13 @@ contains
     all_of_it = 0.0_wp
     call table%file%read_block('/blocks', [1, first], [2, last - first + 1], &
       all_of_it(2*first - 1:2*last))
-    call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last), &
-      0.0_wp)
+    call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last))
     call table%file%read('/blocks', all_of_it)
-    call check('blocks of all processes fit together', all_of_it, mine, 0.0_wp)
+    call check('blocks of all processes fit together', all_of_it, mine)
     call table%file%read_block('/field', [1, 1, 3], [2, layers, 1], x)
-    call check('compressed blocks fit together', x, real(real(3*mine, sp), wp), 0.0_wp)
+    call check('compressed blocks fit together', x, real(real(3*mine, sp), wp))
     call table%file%read('/count', x(:3))
-    call check('rows of the root process arrive', x(:3), [1.0_wp, 2.0_wp, 3.0_wp], 0.0_wp)
+    call check('rows of the root process arrive', x(:3), [1.0_wp, 2.0_wp, 3.0_wp])
     call table%file%close()
     call check_file('no error with a shared file', table%file)
     call meet()
@@ -252,7 +251,7 @@ contains
     if (.not. is_root()) return
     call table%file%open(path, .false., .false.)
     call table%file%read_block('/field', [1, 3], [layers, 1], x)
-    call check('the new row stands in it', x, real(a, wp), 0.0_wp)
+    call check('the new row stands in it', x, real(a, wp))
     call table%file%close()
   end subroutine test_go_on_together
 
@@ -300,9 +299,8 @@ contains
     if (.not. is_root()) return
     call file%create('no/such/folder/run.h5', .false.)
     call check('a folder that is not there is an error', file%info /= 0)
-    call check('the message names file and reason', index(file%message, &
-      'no/such/folder/run.h5') == 1 &
-               .and. index(file%message, 'No such file or directory') > 0)
+    call check('the message names file and reason', index(file%message, 'no/such/folder/run.h5') &
+      == 1 .and. index(file%message, 'No such file or directory') > 0)
     call file%store('/a', 'm', [1.0_wp])   ! after an error everything returns at once
     call file%flush()
     call file%close()

@@ -22,9 +22,8 @@ module test_pressure_m
   private
   public :: test_pressure
 
-  character(*), parameter :: closed = 'no_slip no_slip no_slip no_slip no_slip no_slip', &
-    tank = 'no_slip no_slip slip slip no_slip open', &
-    channel = 'periodic periodic slip slip no_slip open'
+  character(*), parameter :: closed = 'no_slip no_slip no_slip no_slip no_slip no_slip', tank &
+    = 'no_slip no_slip slip slip no_slip open', channel = 'periodic periodic slip slip no_slip open'
   integer, parameter :: cells(3) = [12, 8, 12]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
   real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
@@ -174,7 +173,7 @@ contains
     call check('rough is less work', rough < pressure%report%iterations)
     both = both_solves(pressure_report_t(3, 20, 0.5_wp, .false.), pressure%report)
     call check('a first solve without end is told', .not. both%converged)
-    call check('both: divergence of the first', both%divergence, 0.5_wp, 0.0_wp)
+    call check('both: divergence of the first', both%divergence, 0.5_wp)
     both = both_solves(pressure_report_t(3, 20, 0.5_wp, .true.), pressure%report)
     call check('a rough one that ended counts as work only', both%converged &
                .and. both%passes == 3 + pressure%report%passes .and. both%divergence < 1.0e-8_wp)
@@ -245,8 +244,7 @@ contains
     call check('pressed box: converged', pressure%report%converged .and. &
                any(pressure%report%passes == [1, 2]))
     associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
-      displaced = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
-                  /(open_cells*box%grid%volume)
+      displaced = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1))/(open_cells*box%grid%volume)
     end associate
     call divergence(box%grid, box%solid%effective, box%flow, pressure%system%active, &
                     pressure%system%solver%rhs, force(1, 1))
@@ -301,8 +299,7 @@ contains
     call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a%face)
     call check('acceleration: gravity less gradient', a%face(4, 3, 2, 1), &
                0.5_wp - 80.0_wp*box%grid%face(4, 1)/rho, 1.0e-13_wp)
-    call check('acceleration: walls', abs(a%face(1, 3, 2, 1)) + abs(a%face(13, 3, 2, 1)), 0.0_wp, &
-               0.0_wp)
+    call check('acceleration: walls', abs(a%face(1, 3, 2, 1)) + abs(a%face(13, 3, 2, 1)), 0.0_wp)
     call check('acceleration: open top', a%face(4, 3, 13, 3), &
                -9.81_wp + box%flow%p(4, 3, 12)/(0.005_wp*rho), 1.0e-12_wp)
     call cell_mean_of_faces(box%grid, box%solid%aperture, a%face, a%cell)
@@ -322,7 +319,7 @@ contains
     short = dt/(1.0_wp + 2.0_wp*nu*dt*3.0_wp/0.01_wp**2)
     call check('predicted face velocity', box%flow%uf(5, 3, 3, 1), 0.7_wp + 1.5_wp*short, &
                1.0e-15_wp)
-    call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
+    call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp)
     call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
     box%flow%solid_flux = 0.0_wp
     associate (rhs => pressure%system%solver%rhs)
@@ -353,8 +350,7 @@ contains
     box%solid%alpha(9, 4:6, 5) = 0.99_wp   ! next to no water
     box%flow%p(9, 4:6, 5) = 5.0e4_wp
     call extend_pressure(box%grid, g, box%solid%alpha, box%flow, pressure)
-    call check('closed cells: next to no water keeps its pressure', box%flow%p(9, 5, 5), &
-               5.0e4_wp, 0.0_wp)
+    call check('closed cells: next to no water keeps its pressure', box%flow%p(9, 5, 5), 5.0e4_wp)
     box%flow%p(9, 4:6, 5) = hydrostatic(5)
     worst = 0.0_wp
     do k = 1, cells(3)
@@ -381,7 +377,7 @@ contains
     call carry()
     call check('carried pressure: from where the body came', worst(1.0e5_wp), 0.0_wp, 1.0e-9_wp)
     call check('carried pressure: it did move', maxval(abs(box%flow%p - before)) > 0.1_wp)
-    call check('carried pressure: far away', box%flow%p(12, 8, 12), before(12, 8, 12), 0.0_wp)
+    call check('carried pressure: far away', box%flow%p(12, 8, 12), before(12, 8, 12))
     box%solid%alpha = alpha
     call set_bowl(0.0_wp)
     where (alpha >= 1.0_wp) box%flow%p = 1.0e9_wp
@@ -394,13 +390,12 @@ contains
     call fill_scalar_halo(box%grid, box%flow%p)
     before = box%flow%p
     call carry()
-    call check('carried pressure: water at rest', maxval(abs(box%flow%p - before)), 0.0_wp, &
-               1.0e-9_wp)
+    call check('carried pressure: water at rest', box%flow%p - before, 0.0_wp, 1.0e-9_wp)
     box%flow%p(4:6, 3:5, 2:4) = box%flow%p(4:6, 3:5, 2:4) + 100.0_wp
     before = box%flow%p
     box%bodies%motion = 0.0_wp
     call carry()
-    call check('carried pressure: at rest', maxval(abs(box%flow%p - before)), 0.0_wp, 0.0_wp)
+    call check('carried pressure: at rest', box%flow%p - before, 0.0_wp)
   end subroutine carried_with_a_body
 
   !> One call, of the case as it is.
@@ -439,14 +434,11 @@ contains
     real(wp) :: x(3)
     integer :: i, j, k
 
-    do k = 1 - n_halo, cells(3) + n_halo
-      do j = 1 - n_halo, cells(2) + n_halo
-        do i = 1 - n_halo, cells(1) + n_halo
-          x = ([i, j, k] - 0.5_wp)*box%grid%h
-          box%flow%p(i, j, k) = dot_product(weight, x)
-          if (present(curvature)) box%flow%p(i, j, k) = box%flow%p(i, j, k) + bowl(x, curvature)
-        end do
-      end do
+    do concurrent (k=1 - n_halo:cells(3) + n_halo, &
+      j=1 - n_halo:cells(2) + n_halo, i=1 - n_halo:cells(1) + n_halo)
+      x = ([i, j, k] - 0.5_wp)*box%grid%h
+      box%flow%p(i, j, k) = dot_product(weight, x)
+      if (present(curvature)) box%flow%p(i, j, k) = box%flow%p(i, j, k) + bowl(x, curvature)
     end do
   end subroutine set_bowl
 

@@ -11,9 +11,8 @@ module test_resolved_width_m
   public :: test_resolved_width
 
   character(*), parameter :: lf = new_line('a')
-  character(*), parameter :: tank = '&run t_end = 1 /'//lf &
-    //'&grid cells = 10, 1, 10  length = 0.2, 0.5, 0.25 /'//lf &
-    //'&boundary y_min = ''slip'' y_max = ''slip'' /'//lf
+  character(*), parameter :: tank = '&run t_end = 1 /'//lf//'&grid cells = 10, ' &
+    //'1, 10  length = 0.2, 0.5, 0.25 /'//lf//'&boundary y_min = ''slip'' y_max = ''slip'' /'//lf
   character(*), parameter :: rod = '&shape name=''r'' kind=''box'' size=0.02, 0.1, 0.02 /'//lf
   character(*), parameter :: there = '&body shape=''r'' position=0.1, 0.25, 0.1'
   character(*), parameter :: stones = '&shape name=''g'' kind=''rock'' density=2650 ' &

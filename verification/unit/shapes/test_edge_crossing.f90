@@ -69,18 +69,18 @@ contains
 
     call cross_edges(keel(0.3_wp, none, none), ridge(), 0.0_wp, most, crossing)
     call check('depth', crossing%depth, depth, 1.0e-15_wp)
-    call check('counts', crossing%weight, 1.0_wp, 0.0_wp)
+    call check('counts', crossing%weight, 1.0_wp)
     call check('from the keel down', crossing%normal, [0.0_wp, 0.0_wp, -1.0_wp], 1.0e-15_wp)
     call check('half way', crossing%place, [0.0_wp, 0.3_wp, -0.5_wp*depth], 1.0e-15_wp)
     call cross_edges(keel(1.2_wp, none, none), ridge(), 0.0_wp, most, crossing)
-    call check('not beyond the end', crossing%weight, 0.0_wp, 0.0_wp)
+    call check('not beyond the end', crossing%weight, 0.0_wp)
     above = keel(0.3_wp, [0.0_wp, 0.0_wp, 2*depth], none)
     call cross_edges(above, ridge(), 0.0_wp, most, crossing)
-    call check('not above', crossing%weight, 0.0_wp, 0.0_wp)
+    call check('not above', crossing%weight, 0.0_wp)
     call cross_edges(above, ridge(), -2*depth, most, crossing)
     call check('but looked at before', crossing%depth, -depth, 1.0e-15_wp)
     call cross_edges(keel(0.3_wp, [0.0_wp, 0.0_wp, -most], none), ridge(), 0.0_wp, most, crossing)
-    call check('not too deep', crossing%weight, 0.0_wp, 0.0_wp)
+    call check('not too deep', crossing%weight, 0.0_wp)
   end subroutine check_crossing
 
   !> The slope of depth^2 weight with a shift and a turn of the keel, near an end of the ridge.
@@ -125,7 +125,7 @@ contains
     type(edge_t) :: back
     real(wp), parameter :: none(3) = 0.0_wp
 
-    call check('may cross at once', turn_before(keel(0.3_wp, none, none), ridge()), 0.0_wp, 0.0_wp)
+    call check('may cross at once', turn_before(keel(0.3_wp, none, none), ridge()), 0.0_wp)
     back = keel(0.3_wp, none, none)
     back%into(3, :) = -back%into(3, :)
     call check('two ridges only after a turn', turn_before(back, ridge()) > 0.1_wp)

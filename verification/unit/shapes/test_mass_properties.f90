@@ -115,11 +115,9 @@ contains
     point = s%point + spread(shift, 2, size(s%point, 2))
     call volume_and_centroid(point, s%tet, volume, x)
     call check('moved block: centroid', x, shift, 1e-16_wp)
-    do j = 1, 3
-      do i = 1, 3
-        want(i, j) = s%inertia(i, j) - rho*s%volume*shift(i)*shift(j)
-        if (i == j) want(i, j) = want(i, j) + rho*s%volume*sum(shift**2)
-      end do
+    do concurrent (j=1:3, i=1:3)
+      want(i, j) = s%inertia(i, j) - rho*s%volume*shift(i)*shift(j)
+      if (i == j) want(i, j) = want(i, j) + rho*s%volume*sum(shift**2)
     end do
     call check('moved block: parallel axes', flat(inertia_about_origin(point, s%tet, rho)), &
                flat(want), 1e-18_wp)
@@ -144,8 +142,7 @@ contains
     do r = 1, 3
       do k = 1, size(kinds)
         call build(trim(kinds(k)), size_m, r, s)
-        if (k >= 3) call check(trim(kinds(k))//': volume', s%volume, volume(k)*h**3, &
-                               1e-14_wp*h**3)
+        if (k >= 3) call check(trim(kinds(k))//': volume', s%volume, volume(k)*h**3, 1e-14_wp*h**3)
         call by_surface(s, s%facet, s%facet_point)
       end do
       call build('cylinder', size_m, r, s)

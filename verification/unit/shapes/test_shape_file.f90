@@ -60,8 +60,8 @@ contains
       call check(kind//': volume', found%volume, built%volume, 1e-13_wp*built%volume)
       call check(kind//': inertia', reshape(found%inertia, [9]), reshape(built%inertia, [9]), &
                  1e-12_wp*maxval(built%inertia))
-      call check(kind//': axes of the file', maxval(abs(maxval(found%point, 2) &
-        - maxval(built%point, 2))), 0.0_wp, 1e-15_wp)
+      call check(kind//': axes of the file', &
+        maxval(found%point, 2) - maxval(built%point, 2), 0.0_wp, 1e-15_wp)
       call check(kind//': tetrahedra', size(found%tet, 2), size(built%tet, 2))
       call check(kind//': surface', size(found%triangle, 2), size(built%triangle, 2))
       n = facets
@@ -72,7 +72,7 @@ contains
         x = found%point(:, found%tet(:, t))
         if (tet_volume(x) <= 0.0_wp) mm = 1.0_wp
       end do
-      call check(kind//': tetrahedra of positive volume', maxval(mm), 0.0_wp, 0.0_wp)
+      call check(kind//': tetrahedra of positive volume', maxval(mm), 0.0_wp)
     end do
     call check(kind//': smallest edge of a cube of the same volume over surface', &
                kind /= 'cube' .or. abs(found%smallest_edge - 0.02_wp) < 1e-15_wp)

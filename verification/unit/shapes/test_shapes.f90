@@ -148,7 +148,7 @@ contains
     call check('hexapod: 35 of them for the flow', size(s%flow_tet, 2), 35)
     call check('hexapod: 30 facets', size(s%facet) - 1, 30)
     call check('hexapod: 240 surface triangles', size(s%triangle, 2), 240)
-    call check('hexapod: smallest edge', s%smallest_edge, d, 0.0_wp)
+    call check('hexapod: smallest edge', s%smallest_edge, d)
     call check('hexapod: farthest corner', maxval(norm2(s%point, 1)), d*sqrt(2.75_wp), 1e-17_wp)
   end subroutine hexapod_sizes
 
@@ -190,7 +190,7 @@ contains
       call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
       call check('sphere: true volume', s%volume, 4*pi/3*a**3, 1e-13_wp*a**3)
       call check('sphere: 20 (2 r)^2 triangles', size(s%triangle, 2), 20*(2*r)**2)
-      call check('sphere: contact points with its true radius', s%sphere_radius(1), a, 0.0_wp)
+      call check('sphere: contact points with its true radius', s%sphere_radius(1), a)
       outside(r) = maxval(norm2(s%point, 1))/a - 1
     end do
     call check('sphere: corners stand out by 4.6 and 1.2 per cent', outside, &

@@ -125,12 +125,8 @@ contains
 
     allocate (net%point(3, (n + 1)**3), net%corner(0))
     net%facet = [1]
-    do k = 0, n
-      do j = 0, n
-        do i = 0, n
-          net%point(:, number([i, j, k])) = real([i, j, k], wp)
-        end do
-      end do
+    do concurrent (k=0:n, j=0:n, i=0:n)
+      net%point(:, number([i, j, k])) = real([i, j, k], wp)
     end do
     do k = 1, n
       do j = 1, n

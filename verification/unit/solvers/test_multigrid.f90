@@ -5,14 +5,14 @@
 module test_multigrid_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient
+  use krylov_m, only: find_null_space, conjugate_gradient
   use solve_control_m, only: solve_control_t, solve_report_t, solved
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use random_counter_m, only: uniform
   use checksum_m, only: checksum_t
   use parallel_m, only: set_threads, nproc, is_root, gather_all
-  use linear_systems_m, only: face_operator_t, make_grid, set_tank, set_random, set_right_side
+  use linear_systems_m, only: system_t, make_grid, set_tank, set_random, complete
   use check_m, only: check
   implicit none
   private
@@ -22,14 +22,7 @@ module test_multigrid_m
   logical, parameter :: sideways(3) = [.true., .true., .false.]
   real(wp), parameter :: tank(3) = [0.3_wp, 0.1_wp, 0.2_wp], unit_box(3) = 1.0_wp
 
-  type :: system_t
-    type(grid_t) :: grid
-    type(face_operator_t) :: op
-    type(multigrid_t) :: multigrid
-    type(krylov_work_t) :: work
-    real(wp), allocatable :: b(:, :, :), x(:, :, :)
-    integer :: its = 0
-  end type system_t
+  type(solve_report_t) :: report
 
 contains
 
@@ -59,10 +52,8 @@ contains
 
     call make_grid(n, tank, top, wraps, system%grid)
     call set_tank(system%grid, system%op)
-    call prepare(system)
-    call test_form('tank', system)
-    call test_bits('tank', system)
-    call check('iterations in the tank', system%its <= most)
+    call test_all('tank', system)
+    call check('iterations in the tank', report%iterations <= most)
   end subroutine test_tank
 
   !> A box with random coefficients, closed faces and closed cells.
@@ -74,22 +65,19 @@ contains
 
     call make_grid(n, unit_box, top, wraps, system%grid)
     call set_random(system%grid, 1, system%op)
-    call prepare(system)
-    call test_form('random box', system)
-    call test_bits('random box', system)
+    call test_all('random box', system)
   end subroutine test_random
 
-  !> Right side, preconditioner and work arrays.
-  subroutine prepare(system)
+  !> What both have to show, named in what they tell.
+  subroutine test_all(name, system)
+    character(*), intent(in) :: name
     type(system_t), intent(inout) :: system
 
-    call set_right_side(system%grid, system%op, system%b)
-    allocate (system%x, source=0*system%b)
-    call krylov_init(system%grid, system%work)
+    call complete(system)
     call find_null_space(system%grid, system%op%cf, system%work)
-    call system%multigrid%init(system%grid)
-    call system%multigrid%setup(system%op%cf)
-  end subroutine prepare
+    call test_form(name, system)
+    call test_bits(name, system)
+  end subroutine test_all
 
   !> x.My = y.Mx, x.Mx > 0; M(2 x) = 2 Mx to the bit, on 5 threads too; closed cells give nothing.
   subroutine test_form(name, system)
@@ -126,12 +114,8 @@ contains
     real(wp), intent(inout), contiguous :: x(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
     integer :: i, j, k
 
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          x(i, j, k) = uniform(seed, 4, i + 1000*(j + 1000*k)) - 0.5_wp
-        end do
-      end do
+    do concurrent (k=grid%lo(3):grid%hi(3), j=grid%lo(2):grid%hi(2), i=grid%lo(1):grid%hi(1))
+      x(i, j, k) = uniform(seed, 4, i + 1000*(j + 1000*k)) - 0.5_wp
     end do
   end subroutine fill_noise
 
@@ -139,20 +123,14 @@ contains
     type(system_t), intent(in) :: system
     real(wp), intent(in), contiguous :: x(system%grid%lo(1) - 1:, system%grid%lo(2) - 1:, &
                                           system%grid%lo(3) - 1:)
-    integer :: i, j, k
 
-    closed_cells_zero = .true.
-    do k = system%grid%lo(3), system%grid%hi(3)
-      do j = system%grid%lo(2), system%grid%hi(2)
-        do i = system%grid%lo(1), system%grid%hi(1)
-          if (any(system%op%cf(i, j, k, :) > 0.0_wp)) cycle
-          if (system%op%cf(i + 1, j, k, 1) > 0.0_wp) cycle
-          if (system%op%cf(i, j + 1, k, 2) > 0.0_wp) cycle
-          if (system%op%cf(i, j, k + 1, 3) > 0.0_wp) cycle
-          closed_cells_zero = closed_cells_zero .and. abs(x(i, j, k)) <= 0.0_wp
-        end do
-      end do
-    end do
+    associate (a => system%grid%lo, b => system%grid%hi, cf => system%op%cf)
+      closed_cells_zero = all(abs(x(a(1):b(1), a(2):b(2), a(3):b(3))) <= 0.0_wp &
+        .or. sum(cf(a(1):b(1), a(2):b(2), a(3):b(3), :), 4) > 0.0_wp &
+        .or. cf(a(1) + 1:b(1) + 1, a(2):b(2), a(3):b(3), 1) > 0.0_wp &
+        .or. cf(a(1):b(1), a(2) + 1:b(2) + 1, a(3):b(3), 2) > 0.0_wp &
+        .or. cf(a(1):b(1), a(2):b(2), a(3) + 1:b(3) + 1, 3) > 0.0_wp)
+    end associate
   end function closed_cells_zero
 
   !> One process: the same bits on 1 and 2 threads. The checksum goes to standard output.
@@ -160,7 +138,6 @@ contains
     character(*), intent(in) :: name
     type(system_t), intent(inout) :: system
     real(wp), allocatable :: first(:, :, :)
-    type(solve_report_t) :: report
     integer :: t
 
     allocate (first, source=system%x)
@@ -169,20 +146,18 @@ contains
       system%x = 0.0_wp
       call conjugate_gradient(system%op, system%multigrid, system%b, system%x, &
         solve_control_t(relative=1.0e-6_wp, max_iterations=200), report, system%work)
-      system%its = report%iterations
       call check(name//': solved', report%info, solved)
       if (t == 1) first(:, :, :) = system%x
       call check(name//': bits do not depend on threads', all(abs(system%x - first) <= 0))
     end do
     call set_threads(1)
-    call print_checksum(name, system%grid, system%its, first)
+    call print_checksum(name, system%grid, first)
   end subroutine test_bits
 
   !> Name, cells, iterations and checksum of the solution of all processes.
-  subroutine print_checksum(name, grid, its, x)
+  subroutine print_checksum(name, grid, x)
     character(*), intent(in) :: name
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: its
     real(wp), intent(in), contiguous :: x(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
     real(wp) :: whole(grid%n(1), grid%n(2), grid%n(3))
     type(checksum_t) :: checksum
@@ -191,7 +166,8 @@ contains
     call gather_all(x(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)), &
       grid%lo, grid%hi, whole)
     call checksum%add_reals(size(whole), whole)
-    if (is_root()) print '(2a, 4(1x, i0), 1x, a)', 'solution ', name, grid%n, its, checksum%text()
+    if (is_root()) print '(2a, 4(1x, i0), 1x, a)', 'solution ', name, grid%n, &
+      report%iterations, checksum%text()
   end subroutine print_checksum
 
   !> One cell under an open top: the cycle divides by the coefficient of the top.

@@ -15,8 +15,7 @@ module test_wall_balance_m
   use merged_cells_m, only: merged_cells_t, order_by_body
   use merged_momentum_m, only: share_acceleration
   use half_kick_m, only: force_of_half_kick
-  use wall_balance_m, only: wall_balance_t, begin_balance, add_push, &
-    force_of_walls
+  use wall_balance_m, only: wall_balance_t, begin_balance, add_push, force_of_walls
   use errors_m, only: to_text
   use case_text_m, only: slip
   use one_body_m, only: one_body_t, place, random_numbers, random_field
@@ -56,8 +55,7 @@ contains
   end subroutine test_wall_balance
 
   subroutine begin()
-    call begin_balance(box%grid, box%case%fluid, box%solid, merged, box%flow, box%flow%rho, &
-                       balance)
+    call begin_balance(box%grid, box%case%fluid, box%solid, merged, box%flow, box%flow%rho, balance)
   end subroutine begin
 
   !> Force on the box whose motion changes by `change` in the step [N, N m].
@@ -98,9 +96,8 @@ contains
     a%cell = 0.0_wp
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume &
-                          *sum([0.0_wp, 0.0_wp, 1.0_wp] &
-                               *mean_apertures(box%grid, box%solid%aperture, c))
+        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*sum([0.0_wp, &
+          0.0_wp, 1.0_wp]*mean_apertures(box%grid, box%solid%aperture, c))
         a%cell(c(1), c(2), c(3), 3) = 0.1_wp*sum(c)/dt
       end associate
     end do
@@ -232,13 +229,9 @@ contains
     a%kicked = .true.
     call begin()
     call random_field(seed, a%cell)
-    do k = 1, cells(3)
-      do j = 1, cells(2)
-        do i = 1, cells(1)
-          mass = box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k)
-          kick(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
-        end do
-      end do
+    do concurrent (k=1:cells(3), j=1:cells(2), i=1:cells(1))
+      mass = box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k)
+      kick(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
     end do
     call find_halves(before)
     call check('equal halves: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
@@ -276,9 +269,8 @@ contains
     type(one_body_t), intent(out) :: at_height
     type(merged_cells_t), intent(out) :: merged_there
 
-    call place('&grid cells=8,8,9 length=.8,.8,.9/ &shape name="b" kind="box" ' &
-      //'size=.36,.36,.37/ &body shape="b" position=.39,.4,'//to_text(z)//'/ '//slip, &
-      at_height, merged_there)
+    call place('&grid cells=8,8,9 length=.8,.8,.9/ &shape name="b" kind="box" size=.36,.36,.37/ ' &
+      //'&body shape="b" position=.39,.4,'//to_text(z)//'/ '//slip, at_height, merged_there)
   end subroutine place_box
 
 end module test_wall_balance_m

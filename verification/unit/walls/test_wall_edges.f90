@@ -28,9 +28,8 @@ contains
   subroutine behind_planes()
     call check('small triangle', apertures_of_plane([1.0_wp, 1.0_wp, 0.0_wp], 0.125_wp), &
                [1.5_wp, 1.5_wp, 1.75_wp], 1.0e-12_wp)
-    call check('large triangle, from the other side', &
-               apertures_of_plane([0.0_wp, -3.0_wp, 3.0_wp], 0.5625_wp), &
-               [2.0_wp - 2.0_wp*0.5625_wp, sqrt(0.875_wp), sqrt(0.875_wp)], 1.0e-12_wp)
+    call check('large triangle, from the other side', apertures_of_plane([0.0_wp, -3.0_wp, &
+      3.0_wp], 0.5625_wp), [2.0_wp - 2.0_wp*0.5625_wp, sqrt(0.875_wp), sqrt(0.875_wp)], 1.0e-12_wp)
     call check('flat wall', apertures_of_plane([0.0_wp, 0.0_wp, 0.2_wp], 0.7_wp), &
                [0.6_wp, 0.6_wp, 2.0_wp], 1.0e-12_wp)
   end subroutine behind_planes
@@ -38,11 +37,10 @@ contains
   !> x and y from 0.24 to 0.53, z from 0.21 to 0.57, cells of 0.1.
   subroutine upright_box()
     call build('kind="box" size=.29,.29,.36', 'position=.385,.385,.39')
-    call check('along a flat side', edge([6, 4, 4]) + edge([4, 6, 4]) + edge([4, 4, 3]), 0.0_wp, &
-               0.0_wp)
-    call check('an edge that holds the centre of its cell', edge([3, 3, 4]), 1.0_wp, 0.0_wp)
-    call check('a corner', edge([3, 3, 3]), 1.0_wp, 0.0_wp)
-    call check('an edge beside the centre of its cell', edge([6, 6, 4]), 0.0_wp, 0.0_wp)
+    call check('along a flat side', edge([6, 4, 4]) + edge([4, 6, 4]) + edge([4, 4, 3]), 0.0_wp)
+    call check('an edge that holds the centre of its cell', edge([3, 3, 4]), 1.0_wp)
+    call check('a corner', edge([3, 3, 3]), 1.0_wp)
+    call check('an edge beside the centre of its cell', edge([6, 6, 4]), 0.0_wp)
     call held_at_edge()
   end subroutine upright_box
 
@@ -57,10 +55,8 @@ contains
     associate (solid => body%solid)
       call check('held beside an edge', solid%effective(3, 3, 4, 1), 1.0_wp/inertia, 1.0e-12_wp)
       call check('and in it', solid%effective(4, 3, 4, 1), 0.4_wp/inertia, 1.0e-12_wp)
-      call check('none along the edge', solid%effective(3, 3, 5, 3), &
-                 solid%aperture(3, 3, 5, 3), 0.0_wp)
-      call check('none at a flat side', solid%effective(4, 6, 4, 2), &
-                 solid%aperture(4, 6, 4, 2), 0.0_wp)
+      call check('none along the edge', solid%effective(3, 3, 5, 3), solid%aperture(3, 3, 5, 3))
+      call check('none at a flat side', solid%effective(4, 6, 4, 2), solid%aperture(4, 6, 4, 2))
       n = 0
       do m = solid%first_held(1), solid%first_held(2) - 1
         if (all(solid%held_face(:, m) == [3, 3, 4, 1])) n = m
@@ -97,14 +93,13 @@ contains
                //'angle_deg=45')
     call check('plane walls', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 1.0e-9_wp)
     call check('there are some', body%solid%n_cut > 10)
-    call check('no held fluid', maxval(abs(body%solid%aperture - body%solid%effective)), 0.0_wp, &
-               1.0e-9_wp)
+    call check('no held fluid', body%solid%aperture - body%solid%effective, 0.0_wp, 1.0e-9_wp)
   end subroutine turned_box
 
   !> Eight cells wide.
   subroutine sphere()
     call build('kind="sphere" size=.8', 'position=.513,.487,.505')
-    call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 0.0_wp)
+    call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp)
     call check('sphere: little held fluid', &
                maxval(body%solid%aperture - body%solid%effective) < 0.1_wp)
   end subroutine sphere
