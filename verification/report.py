@@ -1,7 +1,6 @@
 """The report of `make verify`: one HTML page that needs nothing else, and report.json."""
 
 import base64
-import html
 import io
 import json
 import math
@@ -23,6 +22,7 @@ from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.ticker import LogLocator, MaxNLocator  # noqa: E402
 
 from measures.checks import Checks, Figure, Result, Study  # noqa: E402
+from micstools.pages.html import Markup, filled, markup, tag  # noqa: E402
 from micstools.reading.reader import Run  # noqa: E402
 
 CASES = Path(__file__).resolve().parent / "cases"
@@ -151,12 +151,12 @@ def _cost(run: Finished) -> dict[str, Any]:
 # --- figures
 
 
-def _svg(figure: Any) -> str:
+def _svg(figure: Any) -> Markup:
     text = io.BytesIO()
     figure.savefig(text, format="svg", bbox_inches="tight")
     plt.close(figure)
     code = base64.b64encode(text.getvalue()).decode()
-    return f'<img alt="" src="data:image/svg+xml;base64,{code}">'
+    return tag("img", alt="", src=f"data:image/svg+xml;base64,{code}")
 
 
 def _axes(x: str, y: str, title: str) -> tuple[Any, Axes]:
@@ -168,7 +168,7 @@ def _axes(x: str, y: str, title: str) -> tuple[Any, Axes]:
     return figure, axes
 
 
-def draw(curves: Figure) -> str:
+def draw(curves: Figure) -> Markup:
     """Ours as lines over the reference, as an image element."""
     figure, axes = _axes(curves.x, curves.y, curves.title)
     for k, (name, (x, y)) in enumerate(curves.reference.items()):
@@ -181,7 +181,7 @@ def draw(curves: Figure) -> str:
     return _svg(figure)
 
 
-def draw_study(study: Study) -> str:
+def draw_study(study: Study) -> Markup:
     """Error over resolution, both logarithmic, with the slopes of first and second order."""
     figure, axes = _axes(study.resolution, "|error|", study.quantity)
     cells, errors = np.array(study.cells), np.abs(study.errors)
@@ -203,124 +203,84 @@ def draw_study(study: Study) -> str:
 
 # --- page
 
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 68rem; margin: 2rem auto;
-  padding: 0 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 3rem; border-top: 1px solid #ccc;
-  padding-top: 1rem; }
-table { border-collapse: collapse; margin: .8rem 0; font-size: 14px; }
-th { text-align: left; font-weight: 600; border-bottom: 1px solid #999; }
-th, td { padding: .15rem .9rem .15rem 0; vertical-align: top; }
-td.n { font-variant-numeric: tabular-nums; white-space: nowrap; }
-.pass { color: #1a6b1a; } .miss { color: #b00020; font-weight: 600; }
-.part, .info { color: #777; } img { max-width: 32rem; width: 49%; min-width: 20rem; }
-code { font-size: 13px; } a { color: #0b5394; } summary { cursor: pointer; color: #555; }
-"""
-
 
 def _page(head: dict[str, Any], cases: list[Case], data: list[dict[str, Any]]) -> str:
-    count = {word: sum(case.verdict == word for case in cases) for word in ("pass", "miss")}
-    rest = len(cases) - sum(count.values())
-    seconds = sum(run.seconds for case in cases for run in case.runs)
-    lines = [
-        "<!doctype html><html lang='en'><meta charset='utf-8'>",
-        "<meta name='viewport' content='width=device-width'><title>mics: verification</title>",
-        f"<style>{STYLE}</style><h1>mics: verification</h1>",
-        f"<p>{len(cases)} cases: <span class='pass'>{count['pass']} pass</span>, "
-        f"<span class='{'miss' if count['miss'] else 'info'}'>{count['miss']} miss</span>"
-        f"{f', {rest} in part or not run' if rest else ''}. "
-        f"Level {_safe(head['level'])}, {seconds / 3600:.1f} core hours, made {head['made']} with "
-        f"version {_safe(head['version'])}, revision {_safe(head['git_revision'])}, "
-        f"<code>{_safe(head['compiler'])}</code>, <code>{_safe(head['flags'])}</code>.</p>",
-        "<table><tr><th>case</th><th></th><th>results</th><th>core time</th></tr>",
-    ]
+    verdicts = [case.verdict for case in cases]
+    passed, missed = verdicts.count("pass"), verdicts.count("miss")
+    rest, seconds = len(cases) - passed - missed, 0.0
+    rows = []
     for case in cases:
-        checks = case.checks or Checks("")
+        checks, took = case.checks or Checks(""), sum(run.seconds for run in case.runs)
         counting = [r for r in checks.results + checks.routine if r.counts]
-        held = sum(r.holds for r in counting)
-        took = sum(run.seconds for run in case.runs)
-        lines.append(
-            f"<tr><td><a href='#{case.name}'>{_safe(_title(case))}</a></td>{_verdict(case)}"
-            f"<td class='n'>{held} of {len(counting)}</td><td class='n'>{_time(took)}</td></tr>"
-        )
-    lines.append("</table>")
-    for case, its in zip(cases, data, strict=True):
-        lines += _section(case, its)
-    return "\n".join([*lines, "</html>", ""])
+        held = f"{sum(r.holds for r in counting)} of {len(counting)}"
+        verdict = tag("span", case.verdict, class_=case.verdict.replace(" ", "-"))
+        rows.append([tag("a", _title(case), href=f"#{case.name}"), verdict, held, _time(took)])
+        seconds += took
+    table = _table(["case", "", "results", "core time"], rows)
+    sections = [_section(case, its) for case, its in zip(cases, data, strict=True)]
+    return filled(
+        "report", Path(__file__).parent, cases=markup(table, *sections), n=len(cases),
+        passed=passed, missed=missed, missing="miss" if missed else "info",
+        rest=f", {rest} in part or not run" if rest else "", hours=f"{seconds / 3600:.1f}", **head,
+    )  # fmt: skip
 
 
-def _section(case: Case, data: dict[str, Any]) -> list[str]:
+def _table(heads: list[str], rows: list[list[Any]]) -> Markup:
+    found = [tag("tr", *(tag("td", cell) for cell in row)) for row in rows]
+    return tag("table", tag("tr", *(tag("th", name) for name in heads)), *found)
+
+
+def _section(case: Case, data: dict[str, Any]) -> Markup:
     checks = case.checks or Checks("")
-    lines = [f"<h2 id='{case.name}'>{_safe(_title(case))}</h2>", f"<p>{_about(case)}</p>"]
-    for trouble in (case.problem, *(f"{r.name}: {r.ended}" for r in case.runs if not r.good)):
-        lines += [f"<p class='miss'>{_safe(trouble)}</p>"] if trouble else []
-    if checks.results:
-        lines += _table(checks.results)
-    lines += [draw(curves) for curves in checks.figures]
-    lines += [draw_study(study) for study in checks.studies]
-    for study in checks.studies:
-        lines += _study(study)
-    if checks.routine:
-        held = sum(r.holds for r in checks.routine)
-        inside = "<details><summary>" if held == len(checks.routine) else "<details open><summary>"
-        lines += [
-            f"{inside}divergence, liquid, end of the runs: {held} of {len(checks.routine)} "
-            "hold</summary>",
-            *_table(checks.routine),
-            "</details>",
-        ]
-    lines.append(
-        "<table><tr><th>run</th><th>cells</th><th>steps</th><th>core time</th>"
-        "<th>options other than the defaults</th></tr>"
+    troubles = [case.problem, *(f"{r.name}: {r.ended}" for r in case.runs if not r.good)]
+    routine = checks.routine
+    held = sum(r.holds for r in routine)
+    said = f"divergence, liquid, end of the runs: {held} of {len(routine)} hold"
+    runs = [
+        [run["name"], " × ".join(map(str, run.get("cells", []))), run.get("steps", ""),
+         _time(run["seconds"]),
+         "; ".join(data["options_that_differ"].get(run["name"], [])) or "none"]
+        for run in data["runs"]
+    ]  # fmt: skip
+    left = f"left out here: {', '.join(case.left_out)}"
+    return markup(
+        tag("h2", _title(case), id=case.name),
+        tag("p", _about(case)),
+        *(tag("p", trouble, class_="miss") for trouble in troubles if trouble),
+        _results(checks.results),
+        *map(draw, checks.figures),
+        *map(draw_study, checks.studies),
+        *map(_study, checks.studies),
+        tag("details", tag("summary", said), _results(routine), open=held < len(routine) or None)
+        if routine
+        else None,
+        _table(["run", "cells", "steps", "core time", "options other than the defaults"], runs),
+        *(tag("p", f"not what the case is about: {text}", class_="miss") for text in case.strange),
+        tag("p", left, class_="info") if case.left_out else None,
     )
-    for run in data["runs"]:
-        options = "<br>".join(map(_safe, data["options_that_differ"].get(run["name"], [])))
-        cells = " × ".join(map(str, run.get("cells", [])))
-        lines.append(
-            f"<tr><td>{_safe(run['name'])}</td><td class='n'>{cells}</td>"
-            f"<td class='n'>{run.get('steps', '')}</td><td class='n'>{_time(run['seconds'])}</td>"
-            f"<td>{options or 'none'}</td></tr>"
-        )
-    lines.append("</table>")
-    for text in case.strange:
-        lines.append(f"<p class='miss'>not what the case is about: {_safe(text)}</p>")
-    if case.left_out:
-        lines.append(f"<p class='info'>left out here: {_safe(', '.join(case.left_out))}</p>")
-    return lines
 
 
-def _table(results: list[Result]) -> list[str]:
-    lines = [
-        "<table><tr><th>quantity</th><th>ours</th><th>reference</th><th>error</th>"
-        "<th>band</th><th></th></tr>"
-    ]
+def _results(results: list[Result]) -> Markup | None:
+    rows = []
     for r in results:
         mark = ("pass" if r.holds else "miss") if r.counts else "info"
-        word = ("pass" if r.holds else "miss") if r.counts else "for information"
-        cells = "".join(
-            f"<td class='n'>{_safe(t)}</td>" for t in (r.ours, r.reference, r.error, r.band)
-        )
-        lines.append(f"<tr><td>{_safe(r.quantity)}</td>{cells}<td class='{mark}'>{word}</td></tr>")
-    return [*lines, "</table>"]
+        word = tag("span", mark if r.counts else "for information", class_=mark)
+        rows.append([r.quantity, r.ours, r.reference, r.error, r.band, word])
+    heads = ["quantity", "ours", "reference", "error", "band", ""]
+    return _table(heads, rows) if rows else None
 
 
-def _study(study: Study) -> list[str]:
-    orders = ", ".join(f"{p:.2f}" for p in study.orders) or "-"
-    lines = [
-        f"<table><tr><th>{_safe(study.resolution)}</th><th>{_safe(study.quantity)}</th>"
-        "<th>error</th></tr>"
+def _study(study: Study) -> Markup:
+    rows = [
+        [f"{cells:g}", f"{value:.6g}", f"{100 * error:+.3g} %"]
+        for cells, value, error in zip(study.cells, study.values, study.errors, strict=True)
     ]
-    for cells, value, error in zip(study.cells, study.values, study.errors, strict=True):
-        lines.append(
-            f"<tr><td class='n'>{cells:g}</td><td class='n'>{value:.6g}</td>"
-            f"<td class='n'>{100 * error:+.3g} %</td></tr>"
-        )
+    orders = ", ".join(f"{p:.2f}" for p in study.orders) or "-"
     against = "" if math.isfinite(study.reference) else "; no reference: errors against the finest"
-    return [*lines, "</table>", f"<p>observed order: {orders}{against}</p>"]
-
-
-def _verdict(case: Case) -> str:
-    return f"<td class='{case.verdict.replace(' ', '-')}'>{case.verdict}</td>"
+    return markup(
+        _table([study.resolution, study.quantity, "error"], rows),
+        tag("p", f"observed order: {orders}{against}"),
+    )
 
 
 def _time(seconds: float) -> str:
@@ -338,14 +298,10 @@ def _title(case: Case) -> str:
     return _readme(case).splitlines()[0].lstrip("# ")
 
 
-def _about(case: Case) -> str:
+def _about(case: Case) -> Markup:
     """The first paragraph of the case's README."""
     parts = [
         part for part in _readme(case).split("\n\n") if not part.startswith(("#", "|", "    "))
     ]
-    text = _safe(parts[0]) if parts else ""
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
-
-
-def _safe(value: Any) -> str:
-    return html.escape(str(value))
+    said = markup(parts[0] if parts else "")
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", said))

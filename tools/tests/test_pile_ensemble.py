@@ -311,7 +311,7 @@ def test_no_pattern_where_the_papers_blocks_are_not(tmp_path: Path) -> None:
     folder = write_ensemble(tmp_path)
     found = pile_ensemble.open_ensemble(folder, 0.002)
     text = ensemble_page.page(found)
-    shown = text.split("<main>")[1].split('id="case"')[0]
+    shown = text.split("<main ")[1].split('id="case"')[0]
     assert "pattern" not in shown and "Were the runs enough" in shown
     assert "All blocks let go, five runs" in shown and "Blocks without room, one run" in shown
     assert shown.index("Where blocks will lie") < shown.index("How much piles differ")

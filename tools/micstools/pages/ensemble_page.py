@@ -25,19 +25,6 @@ from micstools.reading.shares import in_words
 from micstools.reading.units import Unit, Units, figure
 from micstools.shapes.geometry import Array
 
-_START = """
-const piles = read('piles'), dialog = document.getElementById('shown');
-let pilePlayer;
-document.querySelectorAll('[data-pile]').forEach(button => button.addEventListener('click', () => {
-  dialog.showModal();
-  pilePlayer = pilePlayer || startPlayer(document.getElementById('player'));
-  const pile = piles.runs[button.dataset.pile];
-  dialog.querySelector('h3').textContent = pile.title;
-  dialog.querySelector('.about').textContent = pile.about;
-  if (pilePlayer) pilePlayer.load({ ...piles.tanks[pile.tank], ...pile.scene });
-}));
-dialog.querySelector('.close').addEventListener('click', () => dialog.close());
-"""
 _SAID = {
     "A": "runs every dropped block ends off the floor (pattern A)",
     "B": "at least one more comes down to it (B)",
@@ -95,7 +82,7 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
         _case(ensemble, run),
         _table(ensemble),
         data("piles", _scenes(ensemble, north)),
-        script=_START,
+        more=("ensemble",),
     )
 
 

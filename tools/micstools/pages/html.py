@@ -3,21 +3,16 @@
 import base64
 import html
 import json
-from importlib.resources import files
+from pathlib import Path
+from string import Template
 from typing import Any
 
+FOLDER = Path(__file__).parent
 # The page may load nothing at all; the browser itself refuses what this does not allow.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 _ASKING = "; connect-src 'self'"
-_SCRIPTS = (
-    "vectors",
-    "water",
-    "block_map",
-    "stage",
-    "overlay",
-    "hands",
-    "player",
-)  # each uses those before
+# Each uses those before.
+_SCRIPTS = ("vectors", "water", "block_map", "stage", "overlay", "hands", "player")
 _EMPTY = ("img", "input", "meta")  # have no end
 
 
@@ -74,6 +69,12 @@ def facts(pairs: list[tuple[str, object, str]]) -> Markup:
     ), class_="facts")  # fmt: skip
 
 
+def filled(file: str, /, folder: Path = FOLDER, **parts: object) -> Markup:
+    """The markup of `file`.html with its $parts, escaped where they are not markup yet."""
+    text = (folder / f"{file}.html").read_text()
+    return Markup(Template(text).substitute({key: markup(part) for key, part in parts.items()}))
+
+
 def download(name: str, kind: str, content: str, words: str) -> Markup:
     """A link that saves a text; it is in the page already."""
     data = base64.b64encode(content.encode()).decode()
@@ -96,24 +97,7 @@ def document(
 ) -> str:
     """The whole page with its style and scripts, `more` of them, `script` the one that starts
     them. A page with a `head` of a server may ask that server, a `wide` one takes more room."""
-    style = (files("micstools.pages") / "page.css").read_text()
-    player = "".join(
-        (files("micstools.pages") / f"{name}.js").read_text() for name in (*_SCRIPTS, *more)
-    )
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag(
-            "meta",
-            http_equiv="Content-Security-Policy",
-            content=_POLICY + (_ASKING if head else ""),
-        ),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", name="color-scheme", content="light dark"),
-        tag("title", title),
-        head,
-        Markup(f"<style>\n{style}</style>"),
-    )
-    scripts = Markup(f"<script>\n{player}{script}\n</script>")
-    body = tag("body", tag("main", *content, class_="wide" if wide else None), scripts)
-    return f'<!doctype html>\n<html lang="en">\n{head}\n{body}\n</html>\n'
+    script = "".join((FOLDER / f"{name}.js").read_text() for name in (*_SCRIPTS, *more)) + script
+    return filled("page", title=title, content=markup(*content), script=Markup(script), head=head,
+                  policy=_POLICY + (_ASKING if head else ""), width="wide" if wide else "usual",
+                  style=Markup((FOLDER / "page.css").read_text()))  # fmt: skip

@@ -12,7 +12,7 @@ from aiohttp import web
 
 from micstools.cases import program, settings
 from micstools.command import OUTPUT
-from micstools.pages.html import Markup, document, markup, tag
+from micstools.pages.html import Markup, document, filled, markup, tag
 from micstools.pages.parts import player
 from micstools.reading.reader import BadRun
 from micstools.serve import form, watch_page
@@ -21,7 +21,6 @@ from micstools.serve.server import Site, apart, json_answer, order_of, page_answ
 from micstools.serve.watch import Watch, Watched
 
 SCRIPTS = ("plan", "live", "studio")
-_PARTS = ("warnings", "facts", "blocks", "plan")
 _START = "const studio = startStudio();\n"
 
 
@@ -173,49 +172,14 @@ class Studio:
 def frame(draft: Draft, head: Markup, known: bool) -> str:
     """The page of a case; form and check come later. `known`: there is a run to watch."""
     label = "the set-up; arrow keys turn it, + and - zoom; in a flat view drag a block to move it"
-    bar = tag(
-        "div",
-        tag("button", "Run", type="button", id="run", class_="play"),
-        tag("button", "Save", type="button", id="save"),
-        tag("button", "Undo", type="button", id="undo", disabled=True),
-        tag("a", "the run", href="/watch") if known else None,
-        tag("output", id="told", role="status"),
-        class_="row bare",
+    content = filled(
+        "studio",
+        name=draft.case.name,
+        watch=tag("a", "the run", href="/watch") if known else None,
+        player=player("player", label, plan=True, hint=_HINT),
     )
-    stale = tag(
-        "dialog",
-        tag("h3", "The case was changed in another window"),
-        tag("p", "Show that text without your last change, or keep yours: Undo brings that back."),
-        tag("div", tag("button", "Show that text", type="button", value="theirs"),
-            tag("button", "Keep mine", type="button", value="mine"), class_="row"),
-        id="stale",
-    )  # fmt: skip
-    ways = tag(
-        "div",
-        tag("button", "Form", type="button", data_show="form", aria_pressed="true"),
-        tag("button", "Text", type="button", data_show="text", aria_pressed="false"),
-        class_="group",
-        role="group",
-        aria_label="how to edit",
-    )
-    text = tag("textarea", id="text", spellcheck="false", aria_label="the case file", hidden=True)
-    left = tag("div", ways, tag("div", id="form"), text, class_="edit")
-    verdict = tag("p", "Checking …", id="verdict", role="status")
-    wrong = tag("ol", id="problems", class_="remarks")
-    view = player("player", label, plan=True, hint=_HINT)
-    parts = [watch_page.place(name) for name in _PARTS]
-    right = tag("div", verdict, wrong, view, *parts, class_="seen")
-    return document(
-        f"{draft.case.name} – mics studio",
-        tag("h1", draft.case.name),
-        bar,
-        tag("div", left, right, class_="studio"),
-        stale,
-        script=_START,
-        more=SCRIPTS,
-        head=head,
-        wide=True,
-    )
+    return document(f"{draft.case.name} – mics studio", content, script=_START, more=SCRIPTS,
+                    head=head, wide=True)  # fmt: skip
 
 
 _HINT = (

@@ -12,7 +12,7 @@ from micstools.ensembles import ensemble, ensemble_table
 from micstools.ensembles.ensemble import Member
 from micstools.pages import charts, run_page, run_words
 from micstools.pages.charts import Curve
-from micstools.pages.html import Markup, document, facts, markup, section, table, tag
+from micstools.pages.html import Markup, document, facts, filled, markup, table, tag
 from micstools.pages.parts import player
 from micstools.reading import units
 from micstools.reading.reader import Run
@@ -36,41 +36,8 @@ _STEP = (
     ("drift", "liquid_volume_drift", ".1e"),
 )
 _START = "const live = startLive();\n"
+_KEYS = "arrow keys turn it, + and - zoom, space plays"
 Parts = dict[str, Markup]
-
-
-def place(name: str, element: str = "div", **more: object) -> Markup:
-    """Where a part that changes comes."""
-    return tag(element, data_live=name, **more)
-
-
-def buttons(more: Markup | None = None, several: bool = False) -> Markup:
-    """Those that end a run, and `more`. The one that kills it asks first; it is not there for
-    `several` runs."""
-    sure = tag(
-        "dialog",
-        tag("h3", "Stop at once?"),
-        tag("p", "The run ends without a restart file of this moment; what it has written stays. "
-            "From an older restart file, if there is one, it can go on."),
-        tag("div", tag("button", "Stop at once", type="button", class_="danger", data_stop="now"),
-            tag("button", "Let it run", type="button", class_="close"), class_="row"),
-        id="sure",
-    )  # fmt: skip
-    return tag(
-        "div",
-        tag(
-            "button",
-            f"Stop with restart file{'s' if several else ''}",
-            type="button",
-            data_stop="restart",
-        ),
-        None if several else tag("button", "Stop at once …", type="button", data_ask="sure"),
-        more,
-        tag("button", "Make the report", type="button", id="report"),
-        tag("output", id="told", role="status"),
-        None if several else sure,
-        class_="row bare",
-    )
 
 
 def run_frame(
@@ -78,47 +45,16 @@ def run_frame(
 ) -> str:
     """The page of a run; its parts come later. `above` it and `more` buttons where it is part of
     something."""
-    return document(
-        title, above, tag("h1", title), *run_content(more), script=_START, more=SCRIPTS, head=head
-    )
-
-
-def run_content(more: Markup | None) -> list[Markup]:
-    """Places of the parts of a run."""
-    label = "the blocks so far; arrow keys turn it, + and - zoom, space plays"
-    return [
-        place("state", class_="lead"),
-        place("bar"),
-        buttons(more),
-        player("player", label),
-        place("facts"),
-        section("step", "The last rows", place("step")),
-        section("history", "History", place("history")),
-        place("log"),
-    ]
+    stage = player("player", f"the blocks so far; {_KEYS}")
+    content = filled("watch_run", title=title, more=more, player=stage)
+    return document(title, above, content, script=_START, more=SCRIPTS, head=head)
 
 
 def ensemble_frame(title: str, head: Markup) -> str:
     """The page of an ensemble; its parts come later."""
-    label = "the chosen run so far; arrow keys turn it, + and - zoom, space plays"
-    return document(
-        title,
-        tag("h1", title),
-        place("state", class_="lead"),
-        place("bar"),
-        buttons(several=True),
-        section("shares", "Shares so far", place("shares")),
-        section("runs", "Runs", place("runs")),
-        section(
-            "look",
-            "A run",
-            tag("p", "The run that is chosen above.", class_="note"),
-            player("player", label),
-        ),
-        script=_START,
-        more=SCRIPTS,
-        head=head,
-    )
+    stage = player("player", f"the chosen run so far; {_KEYS}")
+    content = filled("watch_ensemble", title=title, player=stage)
+    return document(title, content, script=_START, more=SCRIPTS, head=head)
 
 
 def bar(share: float, words: str) -> Markup:
