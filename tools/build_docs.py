@@ -22,27 +22,7 @@ from latex2mathml.converter import convert
 from check_links import broken_links
 from doc_pages import ROOT, Links, Page, pages, with_links
 
-SETTINGS = """---
-project: mics
-summary: Concrete blocks dropped into water.
-src_dir: {root}/src
-output_dir: {site}
-page_dir: {pages}
-media_dir: {root}/docs/figures
-docmark: !
-predocmark: >
-preprocess: false
-display: public
-sort: alpha
-print_creation_date: false
-md_extensions: markdown.extensions.toc
-css: {style}
----
-"""
-STYLE = """img { max-width: 100%; }
-blockquote { border-left: 3px solid #aaa; padding-left: 1em; }
-td, th { padding: 0.2em 0.8em; vertical-align: top; }
-"""
+HERE = Path(__file__).parent
 # FORD takes a comment that begins with a word and a colon, like `0: off`, for its own settings; our
 # comments hold none.
 RUN_FORD = """
@@ -73,9 +53,8 @@ def write_pages(known: list[Page], links: Links, out: Path) -> Path:
     top = [f"- [{page.source}]({page.url})" for page in known if "cases/" not in str(page.source)]
     (folder / "index.md").write_text("\n".join(["---", "title: Documents", "---", "", *top, ""]))
     settings = out / "ford.md"
-    style = out / "style.css"
-    style.write_text(STYLE)
-    given = SETTINGS.format(root=ROOT, site=out / "site", pages=folder, style=style)
+    given = (HERE / "ford.md").read_text()
+    given = given.format(root=ROOT, site=out / "site", pages=folder, style=HERE / "ford.css")
     settings.write_text(given + first)
     return settings
 

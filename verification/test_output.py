@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,52 +28,8 @@ CASE = CASES / "ranks" / "coupled.nml"
 LONG = ROOT / "input" / "blocks_coarse.nml"
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
-T, N = "T", "N"
-BODY_ROWS = {
-    "time": ("s", ()),
-    "position": ("m", (N, 3)),
-    "quaternion": ("1", (N, 4)),
-    "velocity": ("m/s", (N, 3)),
-    "angular_velocity": ("rad/s", (N, 3)),
-    "fluid_force": ("N", (N, 3)),
-    "fluid_torque": ("N m", (N, 3)),
-    "contact_force": ("N", (N, 3)),
-    "contact_torque": ("N m", (N, 3)),
-    "contact_force_max": ("N", (N,)),
-    "contacts": ("1", (N,)),
-    "on_floor": ("1", (N,)),
-}
-SERIES = {
-    "time": "s",
-    "dt": "s",
-    "cfl": "1",
-    "divergence_max": "1/s",
-    "pressure_passes": "1",
-    "solver_iterations": "1",
-    "liquid_volume": "m3",
-    "liquid_volume_drift": "1",
-    "volume_excess_max": "1",
-    "kinetic_energy_fluid": "J",
-    "kinetic_energy_bodies": "J",
-    "potential_energy_fluid": "J",
-    "potential_energy_bodies": "J",
-    "contact_energy": "J",
-    "energy_excess": "1",
-    "max_overlap": "m",
-    "contact_courant_max": "1",
-    "substeps": "1",
-    "sleeping": "1",
-    "curvature_fallback": "1",
-    "transport_parts": "1",
-    "inertia_clips": "1",
-    "wall_time": "s",
-}
-UNITS_OF_FIELDS = {"liquid": "1", "solid": "1", "pressure": "Pa", "velocity": "m/s"}
-DRY = {
-    "time", "dt", "kinetic_energy_bodies", "potential_energy_bodies", "contact_energy",
-    "max_overlap", "contact_courant_max", "substeps", "sleeping", "wall_time",
-}  # fmt: skip
-"""Columns of a run without fluid; the others are NaN then."""
+CONTRACT = tomllib.loads((ROOT / "verification" / "contract.toml").read_text())
+SERIES, BODY_ROWS = CONTRACT["series"], CONTRACT["bodies"]
 
 
 def start(
@@ -125,17 +82,13 @@ def test_names_units_and_shapes(wet: Path) -> None:
         assert h5.attrs["format_version"] == 1
         rows, bodies = len(h5["series/time"]), len(h5["bodies/mass"])
         assert bodies == 3
-        for name, (units, extent) in BODY_ROWS.items():
-            wanted = (rows, *(bodies if n == N else n for n in extent))
+        for name, (units, *more) in BODY_ROWS.items():
+            wanted = (rows,) if name == "time" else (rows, bodies, *more)
             assert h5[f"bodies/{name}"].shape == wanted, name
             assert h5[f"bodies/{name}"].attrs["units"] == units, name
         assert {n: d.attrs["units"] for n, d in h5["series"].items()} == SERIES
         assert all(d.shape == (rows,) for d in h5["series"].values())
-        assert set(h5["bodies"]) == {
-            *BODY_ROWS, "shape", "name", "mass", "fixed",
-            "release_time", "entry_time", "exit_time", "raised", "planned", "status",
-            "impact_speed", "rest_since",
-        }  # fmt: skip
+        assert set(h5["bodies"]) == {*BODY_ROWS, *CONTRACT["each_body"]}
         for axis, cells in zip("xyz", (24, 16, 32), strict=True):
             assert h5[f"grid/{axis}"].shape == (cells + 1,)
         assert h5["grid/z"][-1] == pytest.approx(0.2, abs=1e-15)
@@ -223,7 +176,7 @@ def test_frames_of_the_fluid(wet: Path) -> None:
         volume = np.prod(h5["VTKHDF"].attrs["Spacing"])
         row = np.searchsorted(run_h5["series/time"][:], times)
         assert np.array_equal(run_h5["series/time"][:][row], times)
-        for name, units in UNITS_OF_FIELDS.items():
+        for name, units in CONTRACT["fields"].items():
             assert data[name].dtype == np.float32
             assert data[name].attrs["units"] == units
             assert data[name].compression == "gzip"
@@ -348,7 +301,7 @@ def test_dry(dry: Path) -> None:
     assert (dry / "blocks.vtkhdf").exists()
     with opened(dry / "run.h5") as h5:
         for name, column in h5["series"].items():
-            there = ~np.isfinite(column[:]) if name in DRY else ~np.isnan(column[:])
+            there = ~np.isfinite(column[:]) if name in CONTRACT["dry"] else ~np.isnan(column[:])
             assert not there.any(), name
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,28 +21,7 @@ PAGE = ROOT / "docs" / "reference.md"
 SCHEMA = ROOT / "docs" / "mics-case.schema.json"
 
 SIDES = [f"{axis}_{end}" for axis in "xyz" for end in ("min", "max")]
-CONTRACT = {
-    "run": "title physics t_end dt cfl_max output field_interval history_interval "
-    "restart_interval stop_when_settled rest_speed rest_time",
-    "grid": "cells length origin",
-    "boundary": " ".join([*SIDES, *(f"{side}_velocity" for side in SIDES)]),
-    "fluid": "liquid_density liquid_viscosity gas_density gas_viscosity gravity water_level "
-    "surface_tension single_phase velocity",
-    "water": "min max",
-    "numerics": "coupling coupling_passes momentum advection solid_fraction subcells "
-    "pressure_solver preconditioner divergence_tolerance max_pressure_passes",
-    "contact": "model law restitution contact_time k_n gamma_n eta_n k_t gamma_t eta_t friction "
-    "wall_friction substep_ratio courant_max sleep",
-    "shape": "name kind size density file scale refinement spheres sphere_spacing seed variants "
-    "mass_50 uniformity mass_min mass_max elongation blockiness",
-    "body": "shape position quaternion axis angle_deg velocity angular_velocity fixed motion "
-    "release_time",
-    "drop": "shape position count first_time interval spread orientation quaternion axis "
-    "angle_deg tilt_deg velocity seed file to shapes weights if_blocked lowering_speed release "
-    "release_height",
-    "bed": "file kind",
-    "start": "file time shift",
-}
+CONTRACT = tomllib.loads((ROOT / "verification" / "contract.toml").read_text())["case"]
 """Groups and variables that users rely on; more may come."""
 
 TANK = {
@@ -177,48 +157,10 @@ def test_examples_are_accepted(rows: list[Row], tmp_path: Path) -> None:
     assert refused == []
 
 
-GIVEN = {
-    "run": "t_end = 0.01  physics = 'dry'",
-    "grid": "cells = 6, 2, 4  length = 0.3, 0.1, 0.2",
-    "shape": "name = 'hexapod'  kind = 'hexapod'  size = 0.02",
-    "body": "shape = 'hexapod'  position = 0.15, 0.05, 0.1",
-    "drop": "shape = 'hexapod'  position = 0.05, 0.05, 0.1",
-    "water": "min = 0, 0, 0  max = 1, 1, 1",
-    "bed": "file = 'mound.txt'",
-    "start": "file = 'fill/run.h5'",
-}
-"""A case with a group of each name that says no more than it must."""
-
-CHOSEN = {
-    **GIVEN,
-    "run": f"{GIVEN['run']}  stop_when_settled = .true.",
-    "shape": "name = 'hexapod'  kind = 'file'  file = 'block.txt'  spheres = 'dense'",
-    "contact": "law = 'constants'",
-    "drop": "shapes = 'hexapod'  position = 0.05, 0.05, 0.1  lowering_speed = 1  "
-    "release = 'height'  release_height = 0",
-    "numerics": "coupling = 'mics'  solid_fraction = 'subcell'",
-}
-"""The same with other choices, which give variables a meaning that have none by default."""
-
-ROCK = {**GIVEN, "shape": "name = 'hexapod'  kind = 'rock'"}
-"""The same with a family of stones."""
-
-NEEDED = {
-    "rest_time": "stop_when_settled = .true.",
-    "scale": "kind = 'file'",
-    "sphere_spacing": "spheres = 'dense'",
-    "to": "count = 2",
-    "weights": "shapes = 'a'",
-    "release_height": "lowering_speed = 1  release = 'height'",
-    "coupling_passes": "coupling = 'mics'",
-    "subcells": "solid_fraction = 'subcell'",
-    **dict.fromkeys(
-        ("variants", "mass_50", "uniformity", "mass_min", "mass_max", "elongation", "blockiness"),
-        "kind = 'rock'",
-    ),
-    **dict.fromkeys(("k_n", "gamma_n", "eta_n", "k_t", "gamma_t", "eta_t"), "law = 'constants'"),
-}
-"""The choice that each of them needs."""
+PLAIN = tomllib.loads((ROOT / "verification" / "given.toml").read_text())
+GIVEN, NEEDED = PLAIN["given"], PLAIN["needed"]
+CHOICES = (GIVEN, {**GIVEN, **PLAIN["chosen"]}, {**GIVEN, **PLAIN["rock"]})
+"""Cases with a group of each name, which give variables a meaning that have none by default."""
 
 
 def used_by_program(
@@ -239,7 +181,7 @@ def test_defaults_are_those_of_the_program(rows: list[Row], tmp_path: Path) -> N
     """A run without a variable uses its printed default, and is the same when it is written; one
     without a meaning is not used."""
     seen = set()
-    for number, given in enumerate((GIVEN, CHOSEN, ROCK)):
+    for number, given in enumerate(CHOICES):
         used = used_by_program(tmp_path / f"without-{number}", given, {})
         defaults: dict[str, str] = {}
         for row in rows:

@@ -1,8 +1,10 @@
 """`mics-tools`: commands help, refuse wrong use in one line, and set variables of a case."""
 
 import os
+import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,8 @@ from calls import mics_tools
 from micstools import cli
 from micstools.cases import program as program_of_tools
 from micstools.cases import settings
-from micstools.reading.reader import BadRun
+from micstools.reading.reader import BadRun, Run
+from test_height_maps import ESRI
 
 ROOT = Path(__file__).parents[2]
 CASE = """\
@@ -53,24 +56,21 @@ def test_every_command_helps_with_examples(name: str, capsys) -> None:
     assert f"mics-tools {name}" in said.split("examples:")[1]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["dance"], "no command 'dance'; there are: run, check"),
-        (["run"], "the following arguments are required: case"),
-        (["check", "no such case.nml"], "no such case.nml"),
-        (["check", "CASE", "--set", "friction=3"], "'friction=3': must be group.variable=value"),
-        (["check", "CASE", "--program", "/"], "/: is no program"),
-        (["plot", "nowhere"], "nowhere: there is no such folder or file"),
-        (["pile", "CASE", "--nonsense"], "unrecognized arguments: --nonsense"),
-        (["shape", "no.stl", "--out", "a.txt"], "no such file"),
-    ],
-)
-def test_wrong_use_is_one_line(words: list[str], said: str, tmp_path: Path, capsys) -> None:
-    (tmp_path / "CASE").write_text(CASE)
-    assert mics_tools([str(tmp_path / word) if word == "CASE" else word for word in words]) == 2
+REFUSED = tomllib.loads(Path(__file__).with_name("refusals.toml").read_text())
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_wrong_use_is_one_line(
+    words: str, loose_pile: Run, program: Path, tmp_path: Path, capsys
+) -> None:
+    (tmp_path / "CASE").write_text(CASE.replace("0,0,0", "0,0,0 spread = 0.1,0.1,0"))
+    (tmp_path / "MAP.asc").write_text(ESRI)
+    places = {"RUN": loose_pile.folder, "PROGRAM": program, "MAP": tmp_path / "MAP.asc"}
+    places |= {name: tmp_path / name for name in ("CASE", "NEW")}
+    assert mics_tools([str(places.get(word, word)) for word in shlex.split(words)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("mics-tools") and said in line, line
+    assert line.startswith("mics-tools") and REFUSED[words] in line, line
+    assert not (tmp_path / "NEW").exists()
 
 
 def test_settings_keep_the_rest_of_a_case() -> None:

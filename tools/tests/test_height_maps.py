@@ -334,22 +334,6 @@ def test_what_is_no_map_is_one_line(
     assert not (tmp_path / "bed.txt").exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--origin", "1,2"], "--origin 1,2: must be X,Y,Z"),
-        (["--scale", "0"], "--scale 0.0: must be positive"),
-        (["--grid", "1"], "is for scattered points"),
-        (["--window", "101,201,99,202"], "the lower corner first"),
-        (["--window", "101,201,109,202"], "covers x 101 to 107 and y 201 to 205 m only"),
-    ],
-)
-def test_wrong_wishes_are_one_line(tmp_path: Path, words: list[str], said: str, capsys) -> None:
-    path = save(tmp_path / "a.asc", ESRI)
-    assert mics_tools(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words]) == 2
-    assert said in capsys.readouterr().err
-
-
 def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
     """A model at 1:50 of a part of the map, its gap filled, under a tank of 60 x 40 mm."""
     path = save(tmp_path / "a.asc", ESRI.replace("12", "-99"))

@@ -259,26 +259,6 @@ def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:
     assert cover.z[here[1], here[0]] == pytest.approx(1 / 6, abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--to", "csv,shp"], "'shp' is none of csv, geojson, dxf, asc"),
-        (["--origin", "1,2"], "--origin 1,2: must be E,N,LEVEL"),
-        (["--crs", "UTM 32"], "must be as EPSG:25832"),
-        (["--tolerance", "0"], "--tolerance 0.0: must be positive"),
-        (["--layers", "0"], "--layers 0: must be 1 or more"),
-        (["--north", "400"], "--north 400.0: must be degrees"),
-        (["--to", "asc", "--north", "10"], "a raster has its rows along east"),
-        (["--area", "0", "0", "1", "0.1"], "the tank reaches from [0.0, 0.0] to [0.3, 0.1] m"),
-        (["--area", "0.2", "0", "0.1", "0.1"], "the first corner must be the lower one"),
-    ],
-)
-def test_wrong_words_are_told(run: Run, words: list[str], said: str, tmp_path, capsys) -> None:
-    assert mics_tools(["places", str(run.folder), *words, "--out", str(tmp_path / "new")]) == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "new").exists()
-
-
 def test_a_hull_and_a_row() -> None:
     assert handover.crs_name("epsg:25832") == "urn:ogc:def:crs:EPSG::25832"
 

@@ -146,11 +146,6 @@ def test_a_refused_case_is_told_and_nothing_written(tmp_path: Path, capfd) -> No
     assert (remark.group, remark.variable, remark.occurrence) == ("shape", "size", 0)
 
 
-def test_out_goes_with_page(tmp_path: Path, capsys) -> None:
-    assert mics_tools(["check", "case.nml", "--out", str(tmp_path / "a.html")]) == 2
-    assert "--out: goes with --page" in capsys.readouterr().err
-
-
 def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     """It turns, marks a warning, lets blocks come; it loads nothing, and nothing fails."""
     browser.open(page)

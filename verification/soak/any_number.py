@@ -21,14 +21,7 @@ from soak.shop import Shop, column, restart_files, start
 NUMBERS = [f"{ranks}x{threads}" for ranks in (1, 2, 3, 4) for threads in (1, 2)]
 ROUNDED = 5.1e-5  # s, of a time that is told with four digits
 MOVING = 1.0e-2  # m/s of a block that touches something: in the middle of a contact
-SMALL = """! A block is thrown onto the floor of a shallow tank; a second.
-&run t_end = 0.1  dt = 2.0e-3  field_interval = 0.02  restart_interval = 0.03 /
-&grid cells = 20, 10, 16  length = 0.1, 0.05, 0.08 /
-&fluid water_level = 0.03 /
-&shape name = 'cube'  kind = 'cube'  size = 0.02 /
-&body shape = 'cube'  position = 0.03, 0.025, 0.02  axis = 0, 1, 0  angle_deg = 20
-  velocity = 0.2, 0.0, -0.3 /
-"""
+SMALL = Path(__file__).with_suffix(".nml").read_text()
 
 
 def machine(text: str) -> Machine:

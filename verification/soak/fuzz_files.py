@@ -23,6 +23,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import trimesh
 
 from run_cases import ROOT
 from run_soak import Given
@@ -118,32 +119,17 @@ def heightmap(rng: random.Random) -> bytes:
     return ("\n".join(rows) + "\n").encode()
 
 
-def stone(rng: random.Random) -> np.ndarray:
-    """The facets (4, 3 corners, xyz) of a tetrahedron in the tank."""
-    edge = rng.uniform(0.1, 0.3)
-    corner = np.array([[0, 0, 0], [edge, 0, 0], [0, edge, 0], [0, 0, edge]])
-    shift = [rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.6), 0.1]
-    facets: np.ndarray = (corner + shift)[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
-    return facets
-
-
-def ascii_stl(rng: random.Random) -> bytes:
-    """An STL file as text."""
-    rows = ["solid stone"]
-    for facet in stone(rng).tolist():
-        rows += ["facet normal 0 0 0", "outer loop"]
-        rows += ["vertex " + " ".join(map(repr, corner)) for corner in facet]
-        rows += ["endloop", "endfacet"]
-    return ("\n".join([*rows, "endsolid stone"]) + "\n").encode()
-
-
-def binary_stl(rng: random.Random) -> bytes:
-    """An STL file as bytes."""
-    facets = stone(rng)
-    head = rng.choice([b"solid stone", b"stone"]).ljust(80) + struct.pack("<I", len(facets))
-    return head + b"".join(
-        np.concatenate([np.zeros(3), f.ravel()]).astype("<f4").tobytes() + b"\0\0" for f in facets
+def stl(rng: random.Random) -> bytes:
+    """A tetrahedron in the tank as an STL file of either form."""
+    corner, facets = (
+        rng.uniform(0.1, 0.3) * np.eye(4, 3, -1),
+        [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
     )
+    shift = [rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.6), 0.1]
+    stone = trimesh.Trimesh(corner + shift, facets, process=False)
+    if rng.random() < 0.5:
+        return str(stone.export(file_type="stl_ascii")).encode()
+    return rng.choice([b"solid stone", b"stone"]).ljust(80) + stone.export(file_type="stl")[80:]
 
 
 def initial_state(rng: random.Random, odd: bool = False) -> bytes:
@@ -195,11 +181,6 @@ def odd_state(h5: h5py.File, rng: random.Random) -> None:
             h5["liquid"] = np.ones(shape, dtype=complex)
         case 13:
             pass
-
-
-def stl(rng: random.Random) -> bytes:
-    """An STL file of either form."""
-    return rng.choice([ascii_stl, binary_stl])(rng)
 
 
 SIDES = ("no_slip", "slip", "open", "inflow", "outflow", "periodic")

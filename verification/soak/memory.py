@@ -16,17 +16,7 @@ from soak.shop import start
 ALLOWANCE = 1.0e6  # bytes; before the first leak was mended 1,000 steps took 29 MB
 DT = 1.0e-4
 
-CASE = """&run
-  title = 'memory'
-  t_end = {t_end}  dt = {dt}  cfl_max = 0.0
-  field_interval = 0.0  restart_interval = {dt}
-/
-&grid cells = 6, 6, 8  length = 0.06, 0.06, 0.08 /
-&fluid water_level = 0.04 /
-&shape name = 'cube'  kind = 'cube'  size = 0.02  refinement = 1 /
-&body shape = 'cube'  position = 0.03, 0.03, 0.0101 /
-&body shape = 'cube'  position = 0.03, 0.03, 0.0303 /
-"""
+CASE = Path(__file__).with_suffix(".nml").read_text()
 
 
 def peak(machine: Machine, steps: int, work: Path) -> int:

@@ -21,19 +21,7 @@ CHANGING = {
 }
 """Datasets that are written again when a block comes in or is let go."""
 
-CASE = """! A fixed, a free and a dropped block; every result file grows often. One second.
-&run
-  title = 'a full disk'
-  t_end = 0.06  dt = 5.0e-3
-  field_interval = 0.005  restart_interval = 0.015
-/
-&grid cells = 18, 12, 24  length = 0.15, 0.1, 0.2 /
-&fluid water_level = 0.0913 /
-&shape name = 'cube'  kind = 'cube'  size = 0.04 /
-&body shape = 'cube'  position = 0.05, 0.05, 0.025  fixed = .true. /
-&body shape = 'cube'  position = 0.1, 0.05, 0.1  velocity = 0.1, 0.0, -0.6 /
-&drop shape = 'cube'  position = 0.05, 0.05, 0.15  first_time = 0.02 /
-"""
+CASE = Path(__file__).with_suffix(".nml").read_text()
 RESULTS = ("run.h5", "fields.vtkhdf", "blocks.vtkhdf")
 
 

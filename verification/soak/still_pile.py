@@ -18,19 +18,7 @@ MOST_CREEP = 1.0e-6  # m/s
 MOST_DRIFT = 1.0e-9  # of the liquid, relative
 EDGE = 0.02  # m
 
-CASE = """&run
-  title = 'still pile'
-  t_end = {t_end}  dt = 0.05  cfl_max = 0.5
-  field_interval = 0.0  history_interval = {row}  restart_interval = 0.0
-/
-&grid cells = 15, 5, 10  length = 0.15, 0.05, 0.1 /
-&fluid water_level = 0.07 /
-&contact sleep = {sleep} /
-&shape name = 'cube'  kind = 'cube'  size = 0.02 /
-&body shape = 'cube'  position = 0.064, 0.025, 0.01 /
-&body shape = 'cube'  position = 0.086, 0.025, 0.01 /
-&body shape = 'cube'  position = 0.075, 0.025, 0.0301 /
-"""
+CASE = Path(__file__).with_suffix(".nml").read_text()
 
 
 def creep(machine: Machine, seconds: float, sleep: bool, work: Path) -> tuple[str, list[str]]:

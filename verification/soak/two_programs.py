@@ -18,17 +18,7 @@ from run_soak import Given
 from same_bits import LOCK, differences
 from soak.shop import Shop, open_shop
 
-CASE = """! About a second, so that nobody ends before the last has begun.
-&run
-  title = 'two programs'
-  t_end = 0.08  dt = 5.0e-3
-  field_interval = 0.02  restart_interval = 0.04
-/
-&grid cells = 24, 16, 32  length = 0.15, 0.1, 0.2 /
-&fluid water_level = 0.0913 /
-&shape name = 'cube'  kind = 'cube'  size = 0.04 /
-&body shape = 'cube'  position = 0.1, 0.05, 0.1  velocity = 0.1, 0.0, -0.6 /
-"""
+CASE = Path(__file__).with_suffix(".nml").read_text()
 STARTS = ("new", "empty", "used", "in place", "copy into used")
 
 

@@ -11,7 +11,6 @@ Everything is read when it is first asked for. The files may still be growing: r
 complete yet are left out, and `refresh` forgets what was read.
 """
 
-import csv
 import html
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -389,12 +388,9 @@ class Run:
 
     def series_to_csv(self, path: str | Path) -> Path:
         """Write the numbers of every row as a table with the names of the result file."""
-        names = [f.name for f in fields(Series)]
-        with Path(path).open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(names)
-            columns = [getattr(self.series, name).tolist() for name in names]
-            writer.writerows(zip(*columns, strict=True))
+        import pandas as pd
+
+        pd.DataFrame(vars(self.series)).to_csv(path, index=False, lineterminator="\n")
         return Path(path)
 
     @property

@@ -16,33 +16,7 @@ from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import Refused, Remark
 from micstools.reading.reader import BadRun
 
-NEW = """! A first case: cubes dropped into a small tank.
-&run
-  title = 'New case'
-  t_end = 2.0
-  dt = 0.01
-  output = 'mics-out'
-/
-&grid
-  cells = 30, 10, 20
-  length = 0.3, 0.1, 0.2
-/
-&fluid
-  water_level = 0.12
-/
-&shape
-  name = 'cube'
-  kind = 'cube'
-  size = 0.03
-/
-&drop
-  shape = 'cube'
-  position = 0.1, 0.05, 0.16
-  count = 2
-  interval = 0.5
-  spread = 0.02, 0.0, 0.0
-/
-"""
+NEW = Path(__file__).with_name("new.nml").read_text()
 _FIRST = {"shape": {"kind": "cube", "size": 0.02}}
 """Values to begin with that the schema does not ask for, since they depend on others."""
 _STEPS = 200  # that can be taken back
