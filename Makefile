@@ -58,7 +58,7 @@ all: $(binary)
 
 help:
 	@echo 'make deps     install what is missing: compiler, HDF5, MPI, Python packages in .venv;'
-	@echo '               what only tests, drawings or ensembles need comes with their commands'
+	@echo '               no tool installs anything by itself; test, docs and lint add what they need'
 	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
 	@echo 'make SAN=1    ./mics_san, under the address and undefined behaviour sanitizers'
@@ -173,7 +173,7 @@ endif
 
 deps = FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
 deps:
-	@$(deps)
+	@$(deps) shape ensemble survey serve
 
 # How threads wait, and in which pages memory comes: measured in docs/performance.md.
 run bench: export GOMP_SPINCOUNT ?= 1000

@@ -1,10 +1,14 @@
-"""Writes text files whole or not at all."""
+"""Writes text files whole or not at all; tables whose texts a spreadsheet takes for texts."""
 
 import contextlib
+import csv
+import io
 import os
+import re
 import secrets
 import shutil
 import stat
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -37,6 +41,29 @@ def write(path: Path, text: str) -> None:
         new.unlink(missing_ok=True)
     with place.open("r+b") as file:
         _put(file, content)
+
+
+def as_text(value: object) -> object:
+    """A text that a spreadsheet would take for a formula behind an apostrophe, which lets it be a
+    text; figures stay."""
+    if not isinstance(value, str) or not re.match(r"\s*[=+\-@].", value):
+        return value
+    return value if re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", value) else f"'{value}"
+
+
+def table_text(rows: Iterable[dict[str, object]], names: Sequence[str]) -> str:
+    """Rows as CSV under the names of their columns."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([as_text(row[name]) for name in names] for row in rows)
+    return text.getvalue()
+
+
+def write_table(path: Path, rows: Sequence[dict[str, object]]) -> Path:
+    """Write rows with the same names as CSV."""
+    write(path, table_text(rows, list(rows[0])))
+    return path
 
 
 def _mode(old: os.stat_result | None) -> int:

@@ -1,11 +1,13 @@
 """Files are written whole or not at all, and stay what they were."""
 
+import csv
 import os
 from pathlib import Path
 
 import pytest
 
 from micstools import files
+from micstools.pages import html
 
 
 def test_links_modes_and_neighbours_stay(tmp_path: Path) -> None:
@@ -56,3 +58,27 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     files.write(pipe, "text")
     assert os.read(end, 100) == b"text" and pipe.is_fifo()
     os.close(end)
+
+
+FORMULAS = ['=HYPERLINK("http://evil")', "+1+cmd", "-A1", "@SUM(A1)", "\t=1+1", " =1"]
+FIGURES = [-0.5, "-0.5", "+3", "-1.2e-7", ".5", "-", "", "A1", 3]
+
+
+def test_no_name_is_a_formula(tmp_path: Path) -> None:
+    """A spreadsheet shows it as the text that it is; figures stay figures."""
+    rows = [{"name": name, "x": x} for name in FORMULAS for x in FIGURES]
+    with files.write_table(tmp_path / "a.csv", rows).open(newline="") as file:
+        found = list(csv.DictReader(file))
+    assert [r["name"] for r in found] == ["'" + r["name"] for r in rows]
+    assert [r["x"] for r in found] == [str(r["x"]) for r in rows]
+    page = html.table(["name"], [[FORMULAS[3]], ["-0.5 to 3 m"], [html.tag("b", "=1")]])
+    assert "'" + FORMULAS[3] in page.replace("&#x27;", "'") and ">-0.5 to 3 m<" in page
+    assert "<b>=1</b>" in page
+
+
+def test_every_table_is_written_there() -> None:
+    """No other place of the tools makes CSV of texts."""
+    root = Path(files.__file__).parent
+    words = ("csv.writer(", "DictWriter(", ".to_csv(path,")
+    makers = {p.name for p in root.rglob("*.py") if any(w in p.read_text() for w in words)}
+    assert makers == {"files.py", "reader.py"}

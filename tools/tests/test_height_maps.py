@@ -296,6 +296,26 @@ def test_doubled_soundings_and_gaps_are_told(tmp_path: Path) -> None:
         assert [r.split()[0] for r in found.remarks] == ["1", str(found.missing)]
 
 
+def test_lost_points_and_unknown_systems_are_told(tmp_path: Path, capsys) -> None:
+    """Points behind # and coordinates of a survey; a GeoTIFF tells its system."""
+    rows = [f"{354200 + k % 3} {5621080 + k // 3} {-k}" for k in range(9)]
+    rows = ["# x y z", "#354203 5621080 -9", *rows, "# 1,2,3"]
+    path = save(tmp_path / "a.xyz", "\n".join(rows))
+    assert mics_tools(["bed", str(path), "--out", str(tmp_path / "bed.txt")]) == 0
+    told = capsys.readouterr()
+    assert "note      remarks look like points, 2 in all, the first on line 2" in told.out
+    assert "coordinates of a survey, whose system the file does not tell" in told.err
+    with rasterio.open(
+        tmp_path / "a.tif", "w", driver="GTiff", width=4, height=3, count=1, dtype="float32",
+        crs=rasterio.CRS.from_epsg(25832),
+        transform=rasterio.transform.from_origin(354200, 5621080, 2, 2),
+    ) as raster:  # fmt: skip
+        raster.write(Z.astype(np.float32), 1)
+    assert mics_tools(["bed", str(tmp_path / "a.tif"), "--out", str(tmp_path / "bed.txt")]) == 0
+    told = capsys.readouterr()
+    assert "note      places in the system EPSG:25832" in told.out and told.err == ""
+
+
 def test_a_picture_is_no_map(tmp_path: Path) -> None:
     Image.new("RGB", (4, 3)).save(tmp_path / "a.tif")
     warnings.simplefilter("error")

@@ -342,6 +342,20 @@ def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
     assert np.abs(trimesh.load(path).bounds - wanted).max() < 1e-5
 
 
+@pytest.mark.parametrize("kind", ["stl", "obj"])
+def test_a_pile_in_a_survey_counts_from_a_corner(tmp_path: Path, kind: str, capsys) -> None:
+    """Readers of STL hold half a metre there; what 0, 0, 0 is stands beside the file."""
+    run = Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=(354200.5, 5621080.0, -12))))
+    assert mics_tools(["export", str(run.folder), "--to", kind, "--out", str(tmp_path)]) == 0
+    assert "0, 0, 0 of stl and obj is 354200, 5621080, -12 m of the run" in capsys.readouterr().out
+    told = json.loads((tmp_path / "origin.json").read_text())
+    assert told["origin"] == [354200, 5621080, -12]
+    points = np.concatenate([run.points(k, len(run.bodies.time) - 1) for k in range(9)])
+    wanted = np.array([points.min(axis=0), points.max(axis=0)]) - told["origin"]
+    found = trimesh.load(tmp_path / f"pile.{kind}", force="mesh").bounds.astype(np.float32)
+    assert np.abs(found - wanted).max() < 1e-6
+
+
 @can_draw
 def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) -> None:
     import pyvista as pv

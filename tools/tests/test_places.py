@@ -210,7 +210,9 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     assert plan.centroid.coords[0] == pytest.approx((a2.x, a2.y), abs=1e-6)
     assert set(shown[shown.kind == "outline"].surface) == {"ball", "mean"}
 
+    assert json.loads((tmp_path / "places.json").read_text())["survey"]["crs"] == "EPSG:25832"
     drawing = ezdxf.readfile(tmp_path / "places.dxf")
+    assert drawing.header.custom_vars.get("CRS") == "urn:ogc:def:crs:EPSG::25832"
     assert drawing.units == ezdxf.units.M
     meshes = drawing.modelspace().query('MESH[layer=="UNITS"]')
     corners = np.array(meshes[4].vertices)
@@ -232,6 +234,37 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     assert about["within"]["tolerance"] == pytest.approx(EDGE / 2)
     assert about["layer"]["nominal_diameter"] == pytest.approx(EDGE)
     assert set(about["layer"]["definitions"]) >= {"packing", "thickness", "porosity"}
+
+
+@pytest.mark.parametrize("to", ["csv", "geojson", "dxf", "asc"])
+def test_the_system_of_a_survey_is_asked_for(run: Run, to: str, tmp_path: Path, capsys) -> None:
+    """Not of a tank, and not if it is given."""
+    words = ["places", str(run.folder), "--to", to, "--out", str(tmp_path)]
+    far = ["--origin", "354200,5621080,-12.5"]
+    for more, asked in (([], False), (far, True), ([*far, "--crs", "EPSG:25832"], False)):
+        assert mics_tools([*words, *more]) == 0
+        told = capsys.readouterr().err
+        assert ("of which system are coordinates like 354200, 5621080? --crs" in told) == asked
+
+
+def test_a_name_is_no_formula(tmp_path: Path) -> None:
+    """In any table that a spreadsheet opens."""
+    run = write(tmp_path / "run")
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/name"][...] = b"=HYPERLINK(1)"
+    assert mics_tools(["places", str(run.folder)]) == 0
+    Run(run.folder).to_csv(tmp_path / "blocks.csv")
+    for table in (run.folder / "places.csv", tmp_path / "blocks.csv"):
+        with table.open() as file:
+            assert {row["name"] for row in csv.DictReader(file)} == {"'=HYPERLINK(1)"}
+
+
+def test_the_reef_lies_in_its_system() -> None:
+    """In UTM zone 32, whose northings have seven digits."""
+    rows = csv.DictReader(
+        (Path(__file__).parents[2] / "input/reef.csv").open(), skipinitialspace=True
+    )
+    assert all(5.5e6 < float(row["y"]) < 5.7e6 and 3e5 < float(row["x"]) < 4e5 for row in rows)
 
 
 def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:

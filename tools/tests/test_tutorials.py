@@ -44,7 +44,7 @@ SAID = {
     "reef_list": [
         r"dropped +35, the last one at 136 s",
         r"\d+ of 12 \(\d+ %, \d+ to \d+\) of the free units lie within 0\.3 m",
-        r"A3 354207\.\d+ 562110\.\d+ 0\.\d+ 0\.\d+",
+        r"A3 354207\.\d+ 562108[12]\.\d+ 0\.\d+ 0\.\d+",
     ],
 }
 MADE = {

@@ -1,6 +1,9 @@
 """A bed from a map of measured ground."""
 
 import argparse
+import sys
+
+import numpy as np
 
 from micstools.shapes import height_maps
 
@@ -11,6 +14,10 @@ def work(given: argparse.Namespace) -> int:
     if window := given.window:
         found = height_maps.cut(found, (window[0], window[1]), (window[2], window[3]))
     height_maps.require_ground(found)
+    told = found.remarks and found.remarks[0].startswith("places in the system")
+    if not told and np.abs([found.first, found.last]).max() > height_maps.SURVEY:
+        print("coordinates of a survey, whose system the file does not tell: let it be that of the "
+              "plan and of places --crs", file=sys.stderr)  # fmt: skip
     missing = found.missing
     found = height_maps.moved(height_maps.filled(found, given.fill), (x, y, z), given.scale)
     given.out.parent.mkdir(parents=True, exist_ok=True)

@@ -31,6 +31,9 @@ def work(given: argparse.Namespace) -> int:
             _tell_left_out(run)
         else:
             print(exports.FORMATS[name](run, row, folder))
+    if {"stl", "obj"} & set(formats) and (origin := exports.local_origin(run, folder)).any():
+        print(f"0, 0, 0 of stl and obj is {', '.join(f'{x:.0f}' for x in origin)} m of the run "
+              f"({folder / 'origin.json'})")  # fmt: skip
     return 0
 
 

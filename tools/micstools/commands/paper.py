@@ -1,7 +1,6 @@
 """The ensemble of the paper: `tools/paper_ensemble.py`."""
 
 import argparse
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +50,4 @@ def _ensemble(given: argparse.Namespace, choice: Choice, case: str, folder: Path
 
 def _write(folder: Path, rows: list[dict[str, Any]]) -> None:
     files.write(folder / "shares.md", paper_ensemble.as_markdown(rows))
-    with (folder / "shares.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    files.write_table(folder / "shares.csv", rows)

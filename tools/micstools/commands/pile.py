@@ -1,7 +1,6 @@
 """What can be said of the pile of a run, or of the piles of an ensemble."""
 
 import argparse
-import csv
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -84,14 +83,10 @@ def _of_ensemble(ensemble: Ensemble) -> int:
         print(f"     {ensemble.example.run.note}")
     for part in ensemble.parts:
         _tell(part)
-    with (ensemble.folder / "pile.csv").open("w", newline="") as file:
-        rows = pile_ensemble.rows(ensemble)
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    path = files.write_table(ensemble.folder / "pile.csv", pile_ensemble.rows(ensemble))
     if ensemble.whole:
         _write_maps(ensemble)
-    print(f"{ensemble.folder / 'pile.csv'}")
+    print(path)
     write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
     return 0
 

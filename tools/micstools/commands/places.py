@@ -1,6 +1,7 @@
 """Where units lie, as a survey hands it over."""
 
 import argparse
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 from contourpy import contour_generator
 
-from micstools import command, extras
+from micstools import command, extras, files
 from micstools.commands.pile import area_of, write_json
 from micstools.piles import handover, layer, pile_ensemble
 from micstools.piles.handover import Handover
@@ -18,6 +19,7 @@ from micstools.reading import places, units
 from micstools.reading.places import Survey
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import ascii_of
+from micstools.shapes import height_maps
 
 FORMATS = (*handover.WRITERS, "asc")
 CONTOURS = (0.1, 0.5, 0.9)
@@ -29,9 +31,9 @@ def work(given: argparse.Namespace) -> int:
     for word in formats:
         if word not in FORMATS:
             raise BadRun(f"--to {given.to}: '{word}' is none of {', '.join(FORMATS)}")
-    survey = Survey((*given.origin,), given.north)
     if given.crs:
         handover.crs_name(given.crs)
+    survey = Survey((*given.origin,), given.north, given.crs)
     if "asc" in formats and survey.north:
         raise BadRun("--to asc: a raster has its rows along east; with --north there is none")
     if "dxf" in formats:
@@ -41,6 +43,15 @@ def work(given: argparse.Namespace) -> int:
             raise BadRun("--area, --layers: for one run, not for an ensemble")
         return _of_ensemble(given, formats, survey)
     return _of_run(given, formats, survey)
+
+
+def ask_for_system(run: Run, survey: Survey) -> None:
+    """Coordinates of a survey mean a place on Earth only with their system."""
+    corner = survey.of(run.grid.low[:2])
+    if survey.crs or not (np.abs(corner) > height_maps.SURVEY).any():
+        return
+    print(f"of which system are coordinates like {corner[0]:.0f}, {corner[1]:.0f}? --crs EPSG:CODE "
+          "notes it; without it a GIS takes GeoJSON for degrees", file=sys.stderr)  # fmt: skip
 
 
 def _corners(values: list[float] | None, run: Run) -> Corners | None:
@@ -59,6 +70,7 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
     if not run.bodies.n:
         raise BadRun(f"{run.folder} holds no blocks: there are no places")
     area = _corners(given.area, run)
+    ask_for_system(run, survey)
     folder = given.out or run.folder
     folder.mkdir(parents=True, exist_ok=True)
     found = places.places(run, survey)
@@ -91,8 +103,6 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
                 mean = path.with_name("places-mean.asc")
                 for file, surface in ((path, maps.ball), (mean, maps.seen)):
                     print(handover.raster(file, surface + level, survey, maps.low, maps.step))
-        elif name == "geojson":
-            print(handover.to_geojson(handed, path, given.crs))
         else:
             print(handover.WRITERS[name](handed, path))
     write_json(folder / "places.json", about)
@@ -111,6 +121,7 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) 
     folder = given.out or whole.folder
     folder.mkdir(parents=True, exist_ok=True)
     all_places, all_landings, about = [], [], []
+    ask_for_system(whole.example.run, survey)
     for number, part in enumerate(whole.parts, start=1):
         stem = "places" if len(whole.parts) == 1 else f"places-{number}"
         each, tolerance = pile_ensemble.places_of(part, survey, given.tolerance)
@@ -128,8 +139,8 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) 
                       "landings": [asdict(one) for one in found]})  # fmt: skip
         _draw(given, formats, survey, part, folder / stem, found)
     if "csv" in formats:
-        print(handover.table(folder / "places.csv", all_places))
-        print(handover.table(folder / "landings.csv", all_landings))
+        print(files.write_table(folder / "places.csv", all_places))
+        print(files.write_table(folder / "landings.csv", all_landings))
     write_json(folder / "places.json", {"survey": asdict(survey), "columns": places.MEANING,
                "ellipse": places.ELLIPSE, "choices": about})  # fmt: skip
     return 0
@@ -143,9 +154,9 @@ def _draw(given: argparse.Namespace, formats: list[str], survey: Survey, part: E
     for name in formats:
         path = stem.with_name(f"{stem.name}.{name}")
         if name == "geojson":
-            print(handover.landings_to_geojson(found, lines, path, given.crs))
+            print(handover.landings_to_geojson(found, lines, path, survey.crs))
         elif name == "dxf":
-            print(handover.landings_to_dxf(found, lines, path))
+            print(handover.landings_to_dxf(found, lines, path, survey.crs))
         elif name == "asc":
             low = part.example.run.grid.low
             print(handover.raster(path, cover, survey, low, part.step))

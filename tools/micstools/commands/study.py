@@ -1,7 +1,6 @@
 """The same case on coarser and finer cells."""
 
 import argparse
-import csv
 import json
 import subprocess
 import sys
@@ -97,13 +96,9 @@ def _tell(
         rows.append(row | asdict(told))
         unit = pile_numbers.unit(chosen, name)
         print(ascii_of(f"     {name:20}{unit.row(values, digits=5)}  {_words(told, unit)}"))
-    with (folder / "study.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
     known = [{k: None if v != v else v for k, v in row.items()} for row in rows]
     files.write(folder / "study.json", json.dumps(known, indent=2) + "\n")
-    print(folder / "study.csv")
+    print(files.write_table(folder / "study.csv", rows))
 
 
 def _column(factor: float) -> str:

@@ -1,10 +1,8 @@
 """The table of an ensemble, for a spreadsheet and for programs; it knows no machine, no clock."""
 
-import csv
 import json
 from collections import Counter
 from collections.abc import Mapping
-from io import StringIO
 from typing import Any
 
 from micstools import files
@@ -54,12 +52,7 @@ def sentence(table: Table) -> str:
 
 def write(plan: Plan, table: Table) -> None:
     """Write `ensemble.csv` and `ensemble.json`, each as a whole or not at all."""
-    found = rows(table)
-    with StringIO() as text:
-        writer = csv.DictWriter(text, list(found[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(found)
-        files.write(plan.folder / "ensemble.csv", text.getvalue())
+    files.write_table(plan.folder / "ensemble.csv", rows(table))
     content = {
         "format": "mics-ensemble",
         "format_version": 1,
@@ -70,6 +63,6 @@ def write(plan: Plan, table: Table) -> None:
         "choices": [{s.name: s.value for s in choice} for choice in plan.choices],
         "case": plan.text,
         "outcomes": shares(table),
-        "table": found,
+        "table": rows(table),
     }
     files.write(plan.folder / "ensemble.json", json.dumps(content, indent=2) + "\n")

@@ -2,8 +2,6 @@
 whether the runs were enough, and every pile to look at; the shares of the paper's patterns where
 blocks drop on its three fixed ones."""
 
-import csv
-import io
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from micstools import files
 from micstools.pages import charts, motion, run_page, run_words, views
 from micstools.pages.html import Markup, data, document, download, markup, section, table, tag
 from micstools.pages.parts import north_note, number, player
@@ -477,10 +476,6 @@ def _case(ensemble: Ensemble, run: Run) -> Markup:
 def _table(ensemble: Ensemble) -> Markup:
     """The figures of each run, and the files to take along."""
     found = pile_ensemble.rows(ensemble)
-    file = io.StringIO()
-    writer = csv.DictWriter(file, list(found[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(found)
     content = json.dumps(pile_ensemble.summary(ensemble), indent=1)
     varied = sorted({name for choice in ensemble.choices for name in choice})
     shown, patterns = ensemble.units, ensemble.has_patterns
@@ -499,7 +494,8 @@ def _table(ensemble: Ensemble) -> Markup:
                            "outside [%]", *(q.heading(shown) for q in _QUANTITIES)]  # fmt: skip
     name = ensemble.folder.resolve().name
     links = tag("p", "To take along: ",
-                download(f"{name}.csv", "text/csv", file.getvalue(), "all numbers as CSV"), ", ",
+                download(f"{name}.csv", "text/csv",
+                         files.table_text(found, list(found[0])), "all numbers as CSV"), ", ",
                 download(f"{name}.json", "application/json", content, "and as JSON"), ".",
                 class_="no-print")  # fmt: skip
     return section("table", "Each run", table(heads, rows), links)

@@ -3,9 +3,12 @@
 import base64
 import html
 import json
+import re
 from pathlib import Path
 from string import Template
 from typing import Any
+
+from micstools.files import as_text
 
 FOLDER = Path(__file__).parent
 # The page may load nothing at all; the browser itself refuses what this does not allow.
@@ -54,11 +57,17 @@ def table(heads: list[object], rows: list[list[object]], numbers: bool = True) -
     head = tag("thead", tag("tr", *(tag("th", h, scope="col") for h in heads)))
     body = [
         tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:]))
-        for row in rows
+        for row in ([_told(cell) for cell in row] for row in rows)
     ]
     kind = "figures" if numbers else None
     return tag("div", tag("table", head, tag("tbody", *body), class_=kind), class_="scroll",
                tabindex=0)  # fmt: skip
+
+
+def _told(cell: object) -> object:
+    """A cell that a spreadsheet takes for text if it is copied there; signs begin figures."""
+    name = type(cell) is str and not re.match(r"[+-] ?[\d.]", cell)
+    return as_text(cell) if name else cell
 
 
 def facts(pairs: list[tuple[str, object, str]]) -> Markup:

@@ -1,12 +1,13 @@
 """A run in the formats of other programs: a named object per block, SI units, z up."""
 
-import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from micstools.files import table_text, write
 from micstools.pictures import gltf
 from micstools.reading import vtk_data
 from micstools.reading.overlap import present_bodies
@@ -14,6 +15,7 @@ from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array, IntArray
 
 FILMED = 30  # frames a second
+FAR = 100  # lengths of the tank from 0, 0, 0: coordinates of a survey
 Writer = Callable[[Run, int, Path], Path]
 
 
@@ -24,22 +26,31 @@ def to_csv(run: Run, _row: int, folder: Path) -> Path:
 
 def to_final_csv(run: Run, row: int, folder: Path) -> Path:
     """Place and attitude of every released block at a row; blocks count from 1."""
-    b, path = run.bodies, folder / "final.csv"
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"])
-        for k in np.flatnonzero(b.there(row)):
-            pose = [*b.position[row, k].tolist(), *b.quaternion[row, k].tolist()]
-            writer.writerow([int(k) + 1, b.shape[k], int(b.fixed[k]), *pose])
+    b, path, rows = run.bodies, folder / "final.csv", []
+    names = ["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"]
+    for k in np.flatnonzero(b.there(row)):
+        pose = [*b.position[row, k].tolist(), *b.quaternion[row, k].tolist()]
+        rows.append(dict(zip(names, [int(k) + 1, b.shape[k], int(b.fixed[k]), *pose], strict=True)))
+    write(path, table_text(rows, names))
     return path
+
+
+def local_origin(run: Run, folder: Path) -> Array:
+    """What is 0, 0, 0 of STL and OBJ files, whose readers hold seven digits: beside coordinates of
+    a survey the lower corner of the tank in whole metres. `origin.json` tells it."""
+    far = np.abs(run.grid.low).max() > FAR * (run.grid.high - run.grid.low).min()
+    origin = np.floor(run.grid.low) if far else np.zeros(3)
+    told = {"of": ["pile.stl", "pile.obj"], "origin": origin.tolist(), "unit": "m"}
+    write(folder / "origin.json", json.dumps(told) + "\n")
+    return origin
 
 
 def to_stl(run: Run, row: int, folder: Path) -> Path:
     """The released blocks at a row, a solid each, as text."""
-    path = folder / "pile.stl"
+    path, origin = folder / "pile.stl", local_origin(run, folder)
     with path.open("w") as file:
         for k, body in present_bodies(run, row).items():
-            file.write(_solid(f"block-{k + 1}", body.triangles))
+            file.write(_solid(f"block-{k + 1}", body.triangles - origin))
     return path
 
 
@@ -54,10 +65,11 @@ def to_shapes(run: Run, _row: int, folder: Path) -> Path:
 
 def to_obj(run: Run, row: int, folder: Path) -> Path:
     """The released blocks at a row, an object each."""
-    path, first = folder / "pile.obj", 1
+    path, origin, first = folder / "pile.obj", local_origin(run, folder), 1
     with path.open("w") as file:
+        file.write(f"# 0, 0, 0 is {', '.join(map(repr, origin.tolist()))} m of the run\n")
         for k, body in present_bodies(run, row).items():
-            points = body.points
+            points = body.points - origin
             file.write(f"o block-{k + 1}\n")
             file.writelines(f"v {_words(point)}\n" for point in points)
             for triangle in body.shape.triangles + first:

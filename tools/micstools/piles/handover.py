@@ -1,8 +1,7 @@
 """The places of units in the files that a survey takes: a table, GeoJSON, DXF and a raster."""
 
-import csv
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,16 +51,7 @@ def to_csv(given: Handover, path: Path) -> Path:
     return path
 
 
-def table(path: Path, rows: Sequence[dict[str, object]]) -> Path:
-    """A table of rows with the same names."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    return path
-
-
-def to_geojson(given: Handover, path: Path, crs: str | None = None) -> Path:
+def to_geojson(given: Handover, path: Path) -> Path:
     """Per unit a point, and its plan as a polygon; outlines of the layer as lines."""
     found = []
     for p in given.places:
@@ -72,7 +62,7 @@ def to_geojson(given: Handover, path: Path, crs: str | None = None) -> Path:
         found.append(_feature("Polygon", [line], "plan", {"unit": place.unit, "name": place.name}))
     for surface, line in given.outlines:
         found.append(_feature("LineString", line.tolist(), "outline", {"surface": surface}))
-    return _collection(path, found, crs)
+    return _collection(path, found, given.survey.crs)
 
 
 def landings_to_geojson(found: Iterable[Landing], contours: dict[float, list[Array]], path: Path,
@@ -136,7 +126,7 @@ def to_dxf(given: Handover, path: Path) -> Path:
     each, in m."""
     from ezdxf.render.mesh import MeshBuilder
 
-    drawing, space = _drawing()
+    drawing, space = _drawing(given.survey.crs)
     for k, body in given.bodies.items():
         p = given.places[k]
         here = {"layer": "UNITS"}
@@ -160,9 +150,9 @@ def to_dxf(given: Handover, path: Path) -> Path:
 
 
 def landings_to_dxf(found: Iterable[Landing], contours: dict[float, list[Array]],
-                    path: Path) -> Path:  # fmt: skip
+                    path: Path, crs: str | None = None) -> Path:  # fmt: skip
     """The ellipses of landing with the numbers of their units, and lines of cover."""
-    drawing, space = _drawing()
+    drawing, space = _drawing(crs)
     for one in found:
         text = space.add_text(one.name or str(one.unit), dxfattribs={"layer": "NAMES"})
         text.set_placement((one.x, one.y))
@@ -179,12 +169,14 @@ def landings_to_dxf(found: Iterable[Landing], contours: dict[float, list[Array]]
     return path
 
 
-def _drawing() -> tuple[Any, Any]:
-    """An empty drawing in m, and its model space."""
+def _drawing(crs: str | None) -> tuple[Any, Any]:
+    """An empty drawing in m, which notes the system of the survey, and its model space."""
     from ezdxf.filemanagement import new
     from ezdxf.units import M
 
     drawing = new("R2010", units=M)
+    if crs:
+        drawing.header.custom_vars.append("CRS", crs_name(crs))
     for name, colour in _LAYERS.items():
         drawing.layers.add(name, color=colour)
     return drawing, drawing.modelspace()

@@ -1,8 +1,6 @@
 """Where units lie: place, attitude, deviation from the plan, rest and contacts of each; over the
 runs of an ensemble the ellipse in which a unit lands, and the share within a tolerance."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -10,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import pandas as pd
 
+from micstools import files
 from micstools.reading import rest
 from micstools.reading.overlap import find_contacts
 from micstools.reading.reader import Run
@@ -27,10 +26,11 @@ ELLIPSE = 0.9
 @dataclass(frozen=True)
 class Survey:
     """Where the tank lies in the coordinates of a survey: these of the point 0, 0, 0 of the case,
-    and the direction of north in the plan, from +y towards +x [degrees]."""
+    the direction of north in the plan, from +y towards +x [degrees], and their system."""
 
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # easting, northing, level [m]
     north: float = 0.0
+    crs: str | None = None  # as EPSG:25832
 
     def of(self, points: Array) -> Array:
         """East, north and level (..., 3), or east and north (..., 2), of places in the case [m]."""
@@ -156,11 +156,7 @@ def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (i
 
 def csv_text(found: Sequence[Place]) -> str:
     """The places as a table, a row each; what is not known is empty."""
-    file = io.StringIO()
-    writer = csv.DictWriter(file, list(MEANING), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(row_of(p) for p in found)
-    return file.getvalue()
+    return files.table_text(map(row_of, found), list(MEANING))
 
 
 def row_of(place: Place) -> dict[str, object]:

@@ -22,6 +22,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from micstools import files
 from micstools.reading import namelist
 from micstools.reading.profiles import along_line
 from micstools.reading.result_file import BadRun as BadRun
@@ -383,7 +384,10 @@ class Run:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write `blocks` as a table."""
-        self.blocks.to_csv(path, index=False, lineterminator="\n")
+        table = self.blocks
+        for column in ("shape", "name"):
+            table[column] = table[column].map(files.as_text)
+        table.to_csv(path, index=False, lineterminator="\n")
         return Path(path)
 
     def series_to_csv(self, path: str | Path) -> Path:

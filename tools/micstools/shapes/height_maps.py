@@ -23,6 +23,8 @@ MOST_POINTS = 20_000_000
 """Points of a map that the program reads."""
 OFF_GRID = 0.03
 """How far a point of a regular grid may lie aside, for rounded figures, over the spacing."""
+SURVEY = 1e4
+"""Beyond this coordinates are those of a survey, not of a tank [m]."""
 NARROW = 1e-7
 """Width of places on one line, over their length; rounding leaves less."""
 FAR = 3.0
@@ -185,7 +187,7 @@ def report(found: HeightMap) -> str:
         ("y", f"{found.first[1]:.10g} to {found.last[1]:.10g} m"),
         ("heights", f"{found.z.min():.6g} to {found.z.max():.6g} m"),
     ]
-    rows += [("changed", remark) for remark in found.remarks]
+    rows += [("note", remark) for remark in found.remarks]
     return "\n".join(f"{name:10}{text}" for name, text in rows)
 
 
@@ -257,9 +259,9 @@ def _units_of_names(path: Path, head: str, unit: str | None) -> Array:
 
 def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | None) -> HeightMap:
     """Points x, y, z in lines, parted by blanks, commas or semicolons; the first may be names."""
-    lines = path.read_text("utf-8-sig", errors="replace").splitlines()
-    rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in lines]
-    lines = [line for line, row in zip(lines, rows, strict=True) if row != [""]]
+    text = path.read_text("utf-8-sig", errors="replace").splitlines()
+    rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in text]
+    lines = [line for line, row in zip(text, rows, strict=True) if row != [""]]
     rows = [row for row in rows if row != [""]]
     factors = _units_of_names(path, "", unit)
     if rows and not any(map(_is_number, rows[0])):
@@ -273,6 +275,10 @@ def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | 
     points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
     points *= factors
     remarks = ("from other units to m",) * bool((factors != 1).any())
+    numbers = r"[-+\d.]+([\s,;]+[-+\d.]+){2}\s*"
+    lost = [n for n, line in enumerate(text, 1) if re.fullmatch(r"\s*#\s*" + numbers, line)]
+    if lost:
+        remarks += (f"remarks look like points, {len(lost)} in all, the first on line {lost[0]}",)
     if grid is None:
         _require_width(path, points[:, :2])
         return replace(_regular(path, points), remarks=remarks)
@@ -408,7 +414,8 @@ def _geotiff(path: Path, marks: Sequence[float], unit: str | None) -> HeightMap:
     z *= factor
     if step[1] < 0:  # rows come from the north, as a rule
         z, y, step[1] = z[::-1], y + (len(z) - 1) * step[1], -step[1]
-    remarks = [f"heights times {scale:g} plus {offset:g}"] * ((scale, offset) != (1, 0))
+    remarks = [f"places in the system {crs.to_string()[:40]}"] * (crs is not None)
+    remarks += [f"heights times {scale:g} plus {offset:g}"] * ((scale, offset) != (1, 0))
     remarks += [f"from {ground} to m"] * (along != 1)
     remarks += [f"heights from {heights} to m"] * (factor != 1)
     return HeightMap((x, y), (step[0], step[1]), z, tuple(remarks))
