@@ -1,6 +1,6 @@
 !> Datasets of an HDF5 file that have one shape for good: stored and read as a whole, or by blocks.
 module hdf5_file_m
-  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_char, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
   use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND
   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f
   use hdf5, only: h5dwrite_f, H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F
@@ -9,7 +9,8 @@ module hdf5_file_m
   use hdf5, only: h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f
   use hdf5, only: H5S_SELECT_SET_F, H5S_UNLIMITED_F
   use hdf5, only: h5tclose_f, h5tcopy_f, h5tget_size_f, h5tset_size_f, h5tset_strpad_f
-  use hdf5, only: H5T_C_S1, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STR_NULLPAD_F
+  use hdf5, only: H5T_C_S1, H5T_FORTRAN_S1, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, &
+    H5T_STR_NULLPAD_F
   use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root
   use hdf5_handle_m, only: h5_handle_t
@@ -34,7 +35,7 @@ module hdf5_file_m
     generic :: store => store_reals, store_integers, store_texts
     generic :: read => read_reals, read_integers, read_texts
     procedure :: store_wide_integers, shape_of, new_blocks, write_block, read_block
-    procedure :: new_dataset, find, write_part, read_part   ! for columns
+    procedure :: new_dataset, find, pass_part   ! for columns
   end type h5_file_t
 
 contains
@@ -75,32 +76,29 @@ contains
   subroutine store_texts(self, name, units, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    character(*), intent(in) :: a(:)
-    character(kind=c_char), target :: letters(max(1, size(a)*len(a)))
-    integer(hid_t) :: text_type
-    integer :: status, i, j, width
-
-    if (self%info /= 0) return
-    width = max(1, maxval([0, len_trim(a)]))
-    do i = 1, size(a)
-      do j = 1, width
-        letters(j + (i - 1)*width) = merge(c_null_char, a(i)(j:j), j > len_trim(a(i)))
-      end do
-    end do
-    call make_text_type(width, text_type)
-    call put(self, name, units, text_type, [size(a, kind=hsize_t)], c_loc(letters))
-    call h5tclose_f(text_type, status)
-  end subroutine store_texts
-
-  subroutine make_text_type(width, text_type)
-    integer, intent(in) :: width
-    integer(hid_t), intent(out) :: text_type
+    character(*), intent(in), target, contiguous :: a(:)
+    integer(hid_t) :: in_file, here
     integer :: status
 
-    call h5tcopy_f(H5T_C_S1, text_type, status)
-    call h5tset_size_f(text_type, int(width, size_t), status)
-    call h5tset_strpad_f(text_type, H5T_STR_NULLPAD_F, status)
-  end subroutine make_text_type
+    if (self%info /= 0) return
+    call h5tcopy_f(H5T_C_S1, in_file, status)
+    call h5tset_size_f(in_file, int(maxval([1, len_trim(a)]), size_t), status)
+    call h5tset_strpad_f(in_file, H5T_STR_NULLPAD_F, status)
+    here = type_of_texts(len(a))
+    call put(self, name, units, in_file, [size(a, kind=hsize_t)], c_loc(a), here)
+    call h5tclose_f(in_file, status)
+    call h5tclose_f(here, status)
+  end subroutine store_texts
+
+  !> Texts in memory, blanks at their end.
+  function type_of_texts(length) result(type)
+    integer, intent(in) :: length
+    integer(hid_t) :: type
+    integer :: status
+
+    call h5tcopy_f(H5T_FORTRAN_S1, type, status)
+    call h5tset_size_f(type, int(length, size_t), status)
+  end function type_of_texts
 
   pure function shape_or(extent, n) result(found)
     integer, intent(in), optional :: extent(:)
@@ -112,12 +110,13 @@ contains
   end function shape_or
 
   !> Write a whole dataset; of a shared file the root process fills it.
-  subroutine put(self, name, units, type, extent, data)
+  subroutine put(self, name, units, type, extent, data, type_here)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer(hid_t), intent(in) :: type
     integer(hsize_t), intent(in) :: extent(:)
     type(c_ptr), intent(in) :: data
+    integer(hid_t), intent(in), optional :: type_here   !! in memory, if it is another one
     type(dataset_t) :: dataset
     integer :: status
 
@@ -130,7 +129,8 @@ contains
     end if
     if (self%info /= 0) return
     if (product(extent) > 0 .and. (is_root() .or. .not. self%shared)) then
-      call h5dwrite_f(dataset%id, type, data, status)
+      if (present(type_here)) dataset%type = type_here
+      call h5dwrite_f(dataset%id, dataset%type, data, status)
       call self%check(status, 'write '//name)
     end if
     call h5dclose_f(dataset%id, status)
@@ -178,23 +178,14 @@ contains
   subroutine read_texts(self, name, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
-    character(name_length), intent(inout) :: a(:)
-    character(kind=c_char), target :: letters(max(1, size(a)*len(a)))
-    integer(hid_t) :: text_type
-    integer :: status, i, j
+    character(name_length), intent(inout), target, contiguous :: a(:)
+    integer(hid_t) :: here
+    integer :: status
 
     if (self%info /= 0) return
-    call make_text_type(len(a), text_type)
-    call get(self, name, text_type, size(a), c_loc(letters))
-    call h5tclose_f(text_type, status)
-    if (self%info /= 0) return
-    a = ''
-    do i = 1, size(a)
-      do j = 1, len(a)
-        if (letters(j + (i - 1)*len(a)) == c_null_char) exit
-        a(i)(j:j) = letters(j + (i - 1)*len(a))
-      end do
-    end do
+    here = type_of_texts(len(a))
+    call get(self, name, here, size(a), c_loc(a))
+    call h5tclose_f(here, status)
   end subroutine read_texts
 
   !> Read a whole dataset of n elements.
@@ -203,9 +194,8 @@ contains
     character(*), intent(in) :: name
     integer(hid_t), intent(in) :: type
     integer, intent(in) :: n
-    type(c_ptr), intent(in) :: data
+    type(c_ptr), value :: data
     type(dataset_t) :: dataset
-    type(c_ptr) :: there
     integer :: status
 
     dataset = dataset_t(name, '', type)
@@ -214,8 +204,7 @@ contains
     if (product(dataset%extent) /= int(n, hsize_t)) then
       call self%fail(name//' has another size than this case needs')
     else if (n > 0) then
-      there = data
-      call h5dread_f(dataset%id, type, there, status)
+      call h5dread_f(dataset%id, type, data, status)
       call self%check(status, 'read '//name)
     end if
     call h5dclose_f(dataset%id, status)
@@ -301,8 +290,8 @@ contains
     dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
     call h5dopen_f(self%id, name, dataset%id, status)
     call self%check(status, 'open '//name)
-    call self%write_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a), &
-                         self%transfer)
+    call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a), &
+                        self%transfer)
     if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine write_block
 
@@ -317,64 +306,38 @@ contains
 
     dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
     call self%find(dataset)
-    call self%read_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a))
+    call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a))
     if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine read_block
 
-  !> Write a block of a dataset that is open.
-  subroutine write_part(self, dataset, first, extent, data, transfer)
+  !> Write or read a block of a dataset that is open.
+  subroutine pass_part(self, dataset, first, extent, data, transfer)
     class(h5_file_t), intent(inout) :: self
     class(dataset_t), intent(in) :: dataset
     integer(hsize_t), intent(in) :: first(:)   !! from 0
     integer(hsize_t), intent(in) :: extent(:)
-    type(c_ptr), intent(in) :: data
-    integer(hid_t), intent(in) :: transfer     !! H5P_DEFAULT_F: this process alone
-    integer(hid_t) :: there, here
+    type(c_ptr), value :: data
+    integer(hid_t), intent(in), optional :: transfer
+      !! write it, H5P_DEFAULT_F: this process alone; else read it
+    integer(hid_t) :: there, here   ! in the file, in memory
     integer :: status
 
-    call select(self, dataset, first, extent, there, here)
-    if (self%info /= 0) return
-    call h5dwrite_f(dataset%id, dataset%type, data, status, here, there, transfer)
-    call self%check(status, 'write '//dataset%name)
-    call h5sclose_f(there, status)
-    call h5sclose_f(here, status)
-  end subroutine write_part
-
-  !> Read a block of a dataset that is open.
-  subroutine read_part(self, dataset, first, extent, data)
-    class(h5_file_t), intent(inout) :: self
-    class(dataset_t), intent(in) :: dataset
-    integer(hsize_t), intent(in) :: first(:), extent(:)
-    type(c_ptr), intent(in) :: data
-    integer(hid_t) :: there, here
-    type(c_ptr) :: into
-    integer :: status
-
-    call select(self, dataset, first, extent, there, here)
-    if (self%info /= 0) return
-    into = data
-    call h5dread_f(dataset%id, dataset%type, into, status, here, there)
-    call self%check(status, 'read '//dataset%name)
-    call h5sclose_f(there, status)
-    call h5sclose_f(here, status)
-  end subroutine read_part
-
-  !> Select a block of a dataset and describe it in memory.
-  subroutine select(self, dataset, first, extent, there, here)
-    class(h5_file_t), intent(inout) :: self
-    class(dataset_t), intent(in) :: dataset
-    integer(hsize_t), intent(in) :: first(:), extent(:)
-    integer(hid_t), intent(out) :: there, here   !! in the file, in memory
-    integer :: status
-
-    there = -1
-    here = -1
     if (self%info /= 0) return
     call h5dget_space_f(dataset%id, there, status)
     call h5sselect_hyperslab_f(there, H5S_SELECT_SET_F, first, extent, status)
     call self%check(status, 'select a part of '//dataset%name)
     call h5screate_simple_f(size(extent), extent, here, status)
     call self%check(status, 'select a part of '//dataset%name)
-  end subroutine select
+    if (self%info /= 0) return
+    if (present(transfer)) then
+      call h5dwrite_f(dataset%id, dataset%type, data, status, here, there, transfer)
+      call self%check(status, 'write '//dataset%name)
+    else
+      call h5dread_f(dataset%id, dataset%type, data, status, here, there)
+      call self%check(status, 'read '//dataset%name)
+    end if
+    call h5sclose_f(there, status)
+    call h5sclose_f(here, status)
+  end subroutine pass_part
 
 end module hdf5_file_m

@@ -20,7 +20,7 @@
 !! of any length, and it loses the reason of an error.
 module hdf5_handle_m
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_loc, c_char, c_null_char, &
-    c_f_pointer
+    c_f_pointer, c_funptr, c_funloc, c_associated
   use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND, H5P_DEFAULT_F
   use hdf5, only: h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fopen_f
   use hdf5, only: h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f
@@ -32,18 +32,20 @@ module hdf5_handle_m
   use hdf5, only: h5sclose_f, h5screate_f, h5screate_simple_f, H5S_SCALAR_F
   use hdf5, only: h5tclose_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f
   use hdf5, only: H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_NATIVE_DOUBLE, H5T_STRING
-  use c_library_m, only: text_at
+  use hdf5, only: h5open_f, h5eset_auto_f, h5dont_atexit_f
+  use c_library_m, only: c_setenv, text_at
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, exit_files
   use parallel_m, only: is_root, nproc, set_file_access, set_collective, broadcast, &
     global_max
-  use hdf5_reason_m, only: hdf5_start, hdf5_reason
   use posix_file_m, only: is_pipe
   use file_space_m, only: held_file_t
   implicit none
   private
   public :: h5_handle_t
 
+  integer, parameter :: longest_reason = 512
+  logical :: started = .false.             !! is HDF5?
   integer(hsize_t), parameter :: single_value(0) = [integer(hsize_t) ::]   ! extent of a number
 
   type :: h5_handle_t
@@ -72,6 +74,13 @@ module hdf5_handle_m
     procedure :: fixed_text_attribute, last_integer
   end type h5_handle_t
 
+  !> What HDF5 notes about one level of a failed call.
+  type, bind(c) :: record_t
+    integer(c_int64_t) :: class, major, minor
+    integer(c_int) :: line
+    type(c_ptr) :: function_name, file_name, description
+  end type record_t
+
   interface
     !> The address of the number of the open file.
     integer(c_int) function h5fget_vfd_handle(file, access, handle) &
@@ -81,6 +90,16 @@ module hdf5_handle_m
       integer(c_int64_t), value :: file, access
       type(c_ptr), intent(out) :: handle
     end function h5fget_vfd_handle
+
+    !> Walk the stack of errors; `upward` begins at the innermost.
+    integer(c_int) function h5e_walk(stack, direction, visit, data) bind(c, name='H5Ewalk2')
+      import :: c_int, c_int64_t, c_funptr, c_ptr
+      implicit none
+      integer(c_int64_t), value :: stack
+      integer(c_int), value :: direction
+      type(c_funptr), value :: visit
+      type(c_ptr), value :: data
+    end function h5e_walk
   end interface
 
 contains
@@ -92,7 +111,7 @@ contains
     character(*), intent(in) :: what   !! like 'write /series/time'
 
     if (status >= 0 .or. self%info /= 0) return
-    call self%fail('cannot '//what//': '//hdf5_reason())
+    call self%fail('cannot '//what//': '//reason_of_error())
   end subroutine check
 
   !> The same for a reason of our own.
@@ -173,7 +192,7 @@ contains
     self%id = -1
     access = -1
     status = 0
-    call hdf5_start(status(1))
+    call start_hdf5(status(1))
     call self%check(status(1), 'start HDF5')
     if (self%info /= 0) return
     call h5pcreate_f(H5P_FILE_ACCESS_F, access, status(1))
@@ -446,23 +465,11 @@ contains
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: object, name
     character(:), allocatable, intent(out) :: value
-    type(c_ptr), target :: start(1)
-    type(c_ptr) :: data
-    integer(hid_t) :: id, text_type
-    integer :: status
+    type(c_ptr), target :: start
 
+    call get_attribute(self, object, name, c_loc(start))
     value = ''
-    if (self%info /= 0) return
-    call h5aopen_by_name_f(self%id, object, name, id, status)
-    call self%check(status, 'read '//object//'@'//name)
-    if (self%info /= 0) return
-    call h5aget_type_f(id, text_type, status)
-    data = c_loc(start)
-    call h5aread_f(id, text_type, data, status)
-    call self%check(status, 'read '//object//'@'//name)
-    if (self%info == 0) value = text_at(start(1))
-    call h5tclose_f(text_type, status)
-    call h5aclose_f(id, status)
+    if (self%info == 0) value = text_at(start)
   end subroutine read_text_attribute
 
   subroutine read_integer_attribute(self, object, name, value)
@@ -470,22 +477,82 @@ contains
     character(*), intent(in) :: object, name
     integer, intent(out) :: value
     integer(i8), target :: wide
-    type(c_ptr) :: data
-    integer(hid_t) :: id
-    integer :: status
 
     wide = 0
-    if (self%info == 0) then
-      call h5aopen_by_name_f(self%id, object, name, id, status)
-      call self%check(status, 'read '//object//'@'//name)
-    end if
-    if (self%info == 0) then
-      data = c_loc(wide)
-      call h5aread_f(id, h5kind_to_type(i8, H5_INTEGER_KIND), data, status)
-      call self%check(status, 'read '//object//'@'//name)
-      call h5aclose_f(id, status)
-    end if
+    call get_attribute(self, object, name, c_loc(wide), h5kind_to_type(i8, H5_INTEGER_KIND))
     value = int(wide)
   end subroutine read_integer_attribute
+
+  subroutine get_attribute(self, object, name, data, type)
+    class(h5_handle_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    type(c_ptr), value :: data
+    integer(hid_t), intent(in), optional :: type   !! in memory, else that in the file
+    integer(hid_t) :: id, type_there
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5aopen_by_name_f(self%id, object, name, id, status)
+    call self%check(status, 'read '//object//'@'//name)
+    if (self%info /= 0) return
+    call h5aget_type_f(id, type_there, status)
+    if (present(type)) then
+      call h5aread_f(id, type, data, status)
+    else
+      call h5aread_f(id, type_there, data, status)
+    end if
+    call self%check(status, 'read '//object//'@'//name)
+    call h5tclose_f(type_there, status)
+    call h5aclose_f(id, status)
+  end subroutine get_attribute
+
+  !> Start HDF5: without file locks, so that a run can be read while it goes on, unless the user has
+  !! set `HDF5_USE_FILE_LOCKING`; without its own messages; without a routine at exit, because we
+  !! close our files ourselves. Further calls do nothing: HDF5 would keep some 30 kB for each.
+  subroutine start_hdf5(status)
+    integer, intent(out) :: status   !! < 0: failed
+    integer :: ignored
+
+    status = 0
+    if (started) return
+    status = -1
+    if (c_setenv('HDF5_USE_FILE_LOCKING'//c_null_char, 'FALSE'//c_null_char, 0_c_int) /= 0) return
+    call h5dont_atexit_f(ignored)   ! fails when HDF5 is already there
+    call h5open_f(status)
+    if (status >= 0) call h5eset_auto_f(0, status)
+    started = status >= 0
+  end subroutine start_hdf5
+
+  !> Why the last call of HDF5 failed: the system's words if it was the system, else those of HDF5.
+  function reason_of_error() result(reason)
+    character(:), allocatable :: reason
+    character(longest_reason), target :: found
+    character(*), parameter :: mark = "error message = '"
+    integer(c_int) :: status
+    integer :: first
+
+    found = ''
+    status = h5e_walk(0_c_int64_t, 0_c_int, c_funloc(keep_innermost), c_loc(found))
+    reason = trim(found)
+    if (status /= 0 .or. len(reason) == 0) reason = 'unknown reason'
+    first = index(reason, mark)
+    if (first == 0) return
+    reason = reason(first + len(mark):)
+    reason = reason(:index(reason//"'", "'") - 1)
+  end function reason_of_error
+
+  !> Copy the description of level 0, the innermost, into the text that `data` points to.
+  function keep_innermost(level, record, data) result(status) bind(c)
+    integer(c_int), value :: level
+    type(record_t), intent(in) :: record
+    type(c_ptr), value :: data
+    integer(c_int) :: status
+    character(longest_reason), pointer :: found
+
+    status = 0
+    if (level /= 0 .or. .not. c_associated(record%description)) return
+    call c_f_pointer(data, found)
+    found = text_at(record%description)
+  end function keep_innermost
 
 end module hdf5_handle_m

@@ -12,7 +12,7 @@ module output_m
   use bed_m, only: bed_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use result_file_m, only: result_file_t
+  use table_m, only: result_file_t
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
   use diagnostics_m, only: step_report_t, make_row
@@ -282,16 +282,7 @@ contains
     if (row_wanted .or. frame_wanted) call watch_folder(output)
     if (output%code /= exit_ok) return
     if (row_wanted .or. line_wanted) call set_row(state, report, output)
-    if (row_wanted) then
-      call output%run_file%append(state%clock%rows%n, state)
-      call state%clock%rows%done(state%clock%t)
-      state%blocks%record%hardest = 0.0_wp
-      output%row_step = state%clock%step
-    end if
-    if (frame_wanted) then
-      call write_frames(state, output)
-      call state%clock%frames%done(state%clock%t)
-    end if
+    call write_moment(row_wanted, frame_wanted, state, output)
     if (line_wanted) call write_line(output%progress, state%clock, output%run_file%row, &
       state%blocks)
     if (is_root() .and. now > output%next_look) then   ! rows may be far apart
@@ -306,15 +297,26 @@ contains
     end if
   end subroutine write_due_output
 
-  !> Write the frames of this moment as the next ones; the caller counts them if they were due.
-  subroutine write_frames(state, output)
-    type(run_state_t), intent(in) :: state
+  !> Write the row and the frames of this moment as the next ones, and count them if they were due.
+  subroutine write_moment(row, frame, state, output)
+    logical, intent(in) :: row, frame   !! which are wanted
+    type(run_state_t), intent(inout) :: state
     type(output_t), intent(inout) :: output
 
-    if (output%fields) call output%field_file%append(state%clock%frames%n, state)
-    if (output%surfaces) call output%block_file%append(state%clock%frames%n, state)
-    output%frame_step = state%clock%step
-  end subroutine write_frames
+    associate (clock => state%clock)
+      if (row) call output%run_file%append(clock%rows%n, state)
+      if (frame .and. output%fields) call output%field_file%append(clock%frames%n, state)
+      if (frame .and. output%surfaces) call output%block_file%append(clock%frames%n, state)
+      if (row) output%row_step = clock%step
+      if (frame) output%frame_step = clock%step
+      call check_files(output)
+      if (output%code /= exit_ok) return
+      if (frame .and. clock%frames%due(clock%t)) call clock%frames%done(clock%t)
+      if (.not. (row .and. clock%rows%due(clock%t))) return
+      call clock%rows%done(clock%t)
+      state%blocks%record%hardest = 0.0_wp
+    end associate
+  end subroutine write_moment
 
   !> Write the restart file whose turn it is under a temporary name, and rename it when it is
   !! complete and on the disk.
@@ -353,25 +355,14 @@ contains
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     integer :: code
-    logical :: row_wanted, frame_wanted
 
     call watch_folder(output)
     if (output%code == exit_ok) then
       call set_row(state, report, output)
-      row_wanted = output%row_step /= state%clock%step
-      frame_wanted = output%frame_step /= state%clock%step
-      if (row_wanted) call output%run_file%append(state%clock%rows%n, state)
-      if (frame_wanted) call write_frames(state, output)
-      call check_files(output)
+      call write_moment(output%row_step /= state%clock%step, output%frame_step /= &
+                        state%clock%step, state, output)
     end if
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
-      if (row_wanted .and. state%clock%rows%due(state%clock%t)) then
-        call state%clock%rows%done(state%clock%t)
-        state%blocks%record%hardest = 0.0_wp
-      end if
-      if (frame_wanted .and. state%clock%frames%due(state%clock%t)) then
-        call state%clock%frames%done(state%clock%t)
-      end if
       call write_line(output%progress, state%clock, output%run_file%row, state%blocks)
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if

@@ -24,9 +24,10 @@ module table_m
   use parallel_m, only: is_root
   use hdf5_file_m, only: h5_file_t, dataset_t
   use file_space_m, only: bytes_for_change, bytes_for_chunks
+  use run_state_m, only: run_state_t
   implicit none
   private
-  public :: table_t, creating, reopening, appending
+  public :: table_t, result_file_t, creating, reopening, appending
 
   integer, parameter :: creating = 1, reopening = 2, appending = 3
   integer, parameter :: deflate_level = 1      !! higher levels cost time and gain little on fields
@@ -56,6 +57,27 @@ module table_m
     procedure :: begin, find_rows, keep, bytes_for_row, read_row
   end type table_t
 
+  !> A result file of a run: a table whose columns one procedure lists from the state of the run.
+  !! The root process alone writes it, unless it is shared by all.
+  type, abstract, extends(table_t) :: result_file_t
+    character(:), allocatable :: counter
+      !! group whose `@NSteps` counts the rows, if any does; `list_columns` sets it
+  contains
+    procedure(of_state), deferred :: write_head     !! all but columns
+    procedure(of_state), deferred :: list_columns   !! as above
+    procedure :: create, reopen, drop, append
+    procedure, private :: count_rows
+  end type result_file_t
+
+  abstract interface
+    subroutine of_state(self, state)
+      import :: result_file_t, run_state_t
+      implicit none
+      class(result_file_t), intent(inout) :: self
+      type(run_state_t), intent(in) :: state
+    end subroutine of_state
+  end interface
+
 contains
 
   !> Begin to list the columns.
@@ -69,19 +91,24 @@ contains
   end subroutine begin
 
   !> The next column: create it, find it in the file, or append a row to it.
-  subroutine next(self, column, data)
+  subroutine next(self, name, units, type, row, data, per_row, layers)
     class(table_t), intent(inout) :: self
-    type(column_t), intent(in) :: column
-    type(c_ptr), intent(in) :: data   !! its values; null: the caller writes them
+    character(*), intent(in) :: name, units
+    integer(hid_t), intent(in) :: type           !! of its elements
+    integer, intent(in) :: row(:)                !! its shape; empty: a number
+    type(c_ptr), intent(in) :: data              !! its values; null: the caller writes them
+    integer, intent(in), optional :: per_row, layers   !! as in `column_t`
     type(column_t) :: new
 
     self%at = self%at + 1
     if (self%file%info /= 0) return
     if (self%mode == appending) then
-      call append(self%file, self%list(self%at), data)
+      call append_row(self%file, self%list(self%at), data)
       return
     end if
-    new = column
+    new = column_t(name=name, units=units, type=type, row=row)
+    if (present(per_row)) new%per_row = per_row
+    if (present(layers)) new%layers = layers
     if (self%mode == reopening) call open_column(self%file, new)
     if (self%mode == creating) call create_column(self%file, self%chunk_bytes, new)
     self%list = [self%list, new]
@@ -93,8 +120,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target :: x
 
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
-                            row=[integer ::]), c_loc(x))
+    call self%next(name, units, H5T_NATIVE_DOUBLE, [integer ::], c_loc(x))
   end subroutine number
 
   !> Numbers, one of each block.
@@ -103,8 +129,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: x(:)
 
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
-                            row=shape(x)), c_loc(x))
+    call self%next(name, units, H5T_NATIVE_DOUBLE, shape(x), c_loc(x))
   end subroutine numbers
 
   !> Vectors, one of each block.
@@ -113,8 +138,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: x(:, :)   !! (components, blocks)
 
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
-                            row=shape(x)), c_loc(x))
+    call self%next(name, units, H5T_NATIVE_DOUBLE, shape(x), c_loc(x))
   end subroutine vectors
 
   !> Integers, one of each block.
@@ -123,8 +147,7 @@ contains
     character(*), intent(in) :: name, units
     integer, intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_INTEGER, &
-                            row=shape(n)), c_loc(n))
+    call self%next(name, units, H5T_NATIVE_INTEGER, shape(n), c_loc(n))
   end subroutine integers
 
   !> An integer of 64 bits, the kind that VTK uses for numbers of points and cells.
@@ -133,8 +156,7 @@ contains
     character(*), intent(in) :: name, units
     integer(i8), intent(in), target :: n
 
-    call self%next(column_t(name=name, units=units, type=h5kind_to_type(i8, H5_INTEGER_KIND), &
-                            row=[integer ::]), c_loc(n))
+    call self%next(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [integer ::], c_loc(n))
   end subroutine wide_number
 
   subroutine wide_numbers(self, name, units, n)
@@ -142,8 +164,7 @@ contains
     character(*), intent(in) :: name, units
     integer(i8), intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name=name, units=units, type=h5kind_to_type(i8, H5_INTEGER_KIND), &
-                            row=shape(n)), c_loc(n))
+    call self%next(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(n), c_loc(n))
   end subroutine wide_numbers
 
   !> Vectors of points, which follow one another in the file; compressed.
@@ -156,11 +177,9 @@ contains
 
     if (single) then
       allocate (short(3, size(x, 2)), source=real(x, sp))
-      call self%next(column_t(name=name, units=units, type=H5T_NATIVE_REAL, row=[3], &
-                              per_row=size(x, 2), layers=3), c_loc(short))
+      call self%next(name, units, H5T_NATIVE_REAL, [3], c_loc(short), size(x, 2), 3)
     else
-      call self%next(column_t(name=name, units=units, type=H5T_NATIVE_DOUBLE, &
-                              row=[3], per_row=size(x, 2), layers=3), c_loc(x))
+      call self%next(name, units, H5T_NATIVE_DOUBLE, [3], c_loc(x), size(x, 2), 3)
     end if
   end subroutine points
 
@@ -170,8 +189,7 @@ contains
     character(*), intent(in) :: name, units
     integer, intent(in), target, contiguous :: n(:)
 
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_INTEGER, &
-                            row=[integer ::], per_row=size(n)), c_loc(n))
+    call self%next(name, units, H5T_NATIVE_INTEGER, [integer ::], c_loc(n), size(n))
   end subroutine cells
 
   !> Numbers of the cells of a grid in single precision, of which this process gives a block;
@@ -185,11 +203,11 @@ contains
     integer :: layers
 
     layers = max(1, field_bytes/(4*product(whole(:size(whole) - 1))))
-    call self%next(column_t(name=name, units=units, type=H5T_NATIVE_REAL, &
-                            row=whole, layers=min(layers, whole(size(whole)))), c_null_ptr)
+    call self%next(name, units, H5T_NATIVE_REAL, whole, c_null_ptr, &
+                   layers=min(layers, whole(size(whole))))
     if (self%mode /= appending .or. self%file%info /= 0) return
     associate (file => self%file, column => self%list(self%at))
-      call file%write_part(column, [int(first - 1, hsize_t), last_row(column)], &
+      call file%pass_part(column, [int(first - 1, hsize_t), last_row(column)], &
                            [int(extent, hsize_t), 1_hsize_t], c_loc(a), file%transfer)
     end associate
   end subroutine field
@@ -208,7 +226,8 @@ contains
     integer, intent(in) :: chunk_bytes   !! if it is not compressed
     type(column_t), intent(inout) :: column
     integer(hid_t) :: list
-    integer :: status(6), rows
+    real(wp), target :: nothing
+    integer :: status(7), rows
 
     rows = max(min_chunk_rows, chunk_bytes/(8*max(1, product(column%row))))
     if (column%per_row > 1 .or. column%layers > 0) rows = column%per_row
@@ -224,34 +243,14 @@ contains
       call h5pset_fletcher32_f(list, status(5))   ! a chunk that was changed on the disk is not read
       call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status(6))   ! many processes need it
     end if
+    nothing = -1.0_wp   ! in a row that never arrived, and in all but integers NaN
+    if (any(column%type == [H5T_NATIVE_DOUBLE, H5T_NATIVE_REAL])) nothing = ieee_value(nothing, &
+      ieee_quiet_nan)
+    call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status(7))
     call file%check(minval(status), 'create '//column%name)
-    call set_fill(file, column, list)
     call file%new_dataset(column, list)
     call h5pclose_f(list, status(1))
   end subroutine create_column
-
-  !> What a row that never arrived shows: NaN, or -1 for integers.
-  subroutine set_fill(file, column, list)
-    type(h5_file_t), intent(inout) :: file
-    type(column_t), intent(in) :: column
-    integer(hid_t), intent(in) :: list
-    real(wp), target :: nothing
-    real(sp), target :: nothing_single
-    integer, target :: none
-    integer :: status
-
-    nothing = ieee_value(nothing, ieee_quiet_nan)
-    nothing_single = ieee_value(nothing_single, ieee_quiet_nan)
-    none = -1
-    if (column%type == H5T_NATIVE_DOUBLE) then
-      call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status)
-    else if (column%type == H5T_NATIVE_REAL) then
-      call h5pset_fill_value_f(list, H5T_NATIVE_REAL, c_loc(nothing_single), status)
-    else
-      call h5pset_fill_value_f(list, H5T_NATIVE_INTEGER, c_loc(none), status)
-    end if
-    call file%check(status, 'create '//column%name)
-  end subroutine set_fill
 
   !> Open a column of a file that exists.
   subroutine open_column(file, column)
@@ -288,7 +287,7 @@ contains
   end subroutine resize
 
   !> Append a row of the table; of a shared file the root process writes it.
-  subroutine append(file, column, data)
+  subroutine append_row(file, column, data)
     type(h5_file_t), intent(inout) :: file
     type(column_t), intent(inout) :: column
     type(c_ptr), intent(in) :: data   !! null: the caller writes it
@@ -300,8 +299,8 @@ contains
     call resize(file, column, last_row(column) + 1 + column%per_row)
     if (.not. c_associated(data) .or. product(extent) == 0) return
     if (file%shared .and. .not. is_root()) return
-    call file%write_part(column, first, extent, data, H5P_DEFAULT_F)
-  end subroutine append
+    call file%pass_part(column, first, extent, data, H5P_DEFAULT_F)
+  end subroutine append_row
 
   !> Rows that a run keeps which goes on, those that it has counted, and one more if that one is of
   !! this very time; later ones stay until `keep`.
@@ -382,9 +381,77 @@ contains
         extent = [column%extent(:size(column%extent) - 1), 1_hsize_t]
         first = 0*extent
         first(size(first)) = int(row - 1, hsize_t)
-        call self%file%read_part(column, first, extent, c_loc(a))
+        call self%file%pass_part(column, first, extent, c_loc(a))
       end associate
     end do
   end subroutine read_row
+
+  !> Create the file without rows.
+  subroutine create(self, path, shared, state)
+    class(result_file_t), intent(inout) :: self
+    character(*), intent(in) :: path
+    logical, intent(in) :: shared   !! all processes call and write
+    type(run_state_t), intent(in) :: state
+
+    if (.not. (is_root() .or. shared)) return
+    call self%file%create(path, shared)
+    call self%write_head(state)
+    call self%begin(creating)
+    call self%list_columns(state)
+    if (allocated(self%counter)) call self%file%attribute(self%counter, 'NSteps', 0)
+    call self%file%flush()
+  end subroutine create
+
+  !> Open the file of a run that goes on from `state`; nothing in it is changed yet.
+  subroutine reopen(self, path, shared, counted, state)
+    class(result_file_t), intent(inout) :: self
+    character(*), intent(in) :: path
+    logical, intent(in) :: shared
+    integer, intent(in) :: counted   !! rows that the run has counted
+    type(run_state_t), intent(in) :: state
+
+    if (.not. (is_root() .or. shared)) return
+    call self%file%open(path, shared, .true.)
+    call self%begin(reopening)
+    call self%list_columns(state)
+    call self%find_rows(counted, state%clock%t)
+  end subroutine reopen
+
+  !> Keep the first rows.
+  subroutine drop(self, rows)
+    class(result_file_t), intent(inout) :: self
+    integer, intent(in) :: rows
+
+    if (.not. (is_root() .or. self%file%shared)) return
+    call self%count_rows(rows)
+    call self%keep(rows)
+    call self%file%flush()
+  end subroutine drop
+
+  !> Write a row as number `rows_before` + 1, in the place of a row that only ended an earlier run.
+  subroutine append(self, rows_before, state)
+    class(result_file_t), intent(inout) :: self
+    integer, intent(in) :: rows_before   !! due rows written so far
+    type(run_state_t), intent(in) :: state
+
+    if (.not. (is_root() .or. self%file%shared)) return
+    if (self%rows /= rows_before) call self%drop(rows_before)
+    call self%file%reserve(self%bytes_for_row())
+    call self%begin(appending)
+    call self%list_columns(state)
+    self%rows = self%rows + 1
+    call self%count_rows(self%rows)
+  end subroutine append
+
+  !> Say how many rows are complete, once they are in the file.
+  subroutine count_rows(self, rows)
+    class(result_file_t), intent(inout) :: self
+    integer, intent(in) :: rows
+
+    call self%file%flush()
+    if (.not. allocated(self%counter)) return
+    call self%file%attribute(self%counter, 'NSteps', rows)
+    call self%file%flush()
+  end subroutine count_rows
 
 end module table_m

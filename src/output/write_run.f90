@@ -12,8 +12,7 @@ module write_run_m
   use errors_m, only: exit_files
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use result_file_m, only: result_file_t
-  use table_m, only: appending
+  use table_m, only: result_file_t, appending
   use file_space_m, only: bytes_for_change
   use diagnostics_m, only: quantity_t
   implicit none

@@ -13,7 +13,7 @@ module write_vtkhdf_m
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use file_space_m, only: bytes_for_change
-  use result_file_m, only: result_file_t
+  use table_m, only: result_file_t
   implicit none
   private
   public :: field_file_t, block_file_t
