@@ -9,11 +9,10 @@ module faults_m
   use simulation_m, only: simulation_t
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
-  use release_m, only: n_pending
   use deep_overlaps_m, only: overlap_fault
   implicit none
   private
-  public :: fault_t, store_places, find_fault, find_final_fault
+  public :: fault_t, store_places, find_fault, set_fault
 
   type :: fault_t
     integer :: code = exit_ok
@@ -50,24 +49,27 @@ contains
     type(courant_rate_t) :: rate
     real(wp) :: courant
 
-    if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
-    if (.not. report%contacts_solved) call set(sim, 'a step would need more than a million body ' &
-      //'steps: blocks are too fast, or `contact_time` or `substep_ratio` too small', fault)
+    if (.not. sim%start_converged) call set_fault(sim, &
+      'the flow of the start did not converge', fault)
+    if (report%contact%info /= 0) call set_fault(sim, 'a step would need more than a million ' &
+      //'body steps: blocks are too fast, or `contact_time` or `substep_ratio` too small', fault)
     if (.not. report%transport_converged) then
-      call set(sim, 'what small cells of the transport give did not converge', fault)
+      call set_fault(sim, 'what small cells of the transport give did not converge', fault)
     end if
-    if (.not. report%viscous_converged) call set(sim, 'the viscous stage did not converge', fault)
-    if (.not. report%pressure_converged) then
-      call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
-               //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
-    end if
+    if (.not. report%coupling%viscous_converged) call set_fault(sim, 'the viscous stage did not ' &
+      //'converge', fault)
+    associate (pressure => report%coupling%pressure)
+      if (sim%wet .and. .not. pressure%converged) call set_fault(sim, 'divergence ' &
+        //to_text(pressure%divergence)//' 1/s after '//to_text(pressure%passes) &
+        //' passes: above `divergence_tolerance`', fault)
+    end associate
     if (sim%energy%known) then   ! else the excess is NaN
-      if (report%energy_excess > excess_max) call set(sim, 'fluid and blocks have ' &
+      if (report%energy_excess > excess_max) call set_fault(sim, 'fluid and blocks have ' &
         //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was ' &
         //'set free: &run dt or cfl_max is too long for this flow', fault)
     end if
     overlap = overlap_fault(sim%deep)
-    if (len(overlap) > 0) call set(sim, overlap, fault)
+    if (len(overlap) > 0) call set_fault(sim, overlap, fault)
     call look_at_blocks(sim, fault)
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)
@@ -75,7 +77,7 @@ contains
     if (sim%case%run%cfl_max > 0.0_wp) return
     rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)   ! nothing shortens the step
     courant = sim%case%run%dt*max(rate%carried, rate%followed)
-    if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
+    if (.not. courant <= highest_courant) call set_fault(sim, 'Courant number '//brief(courant) &
       //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
       //' keeps it', fault)
   end subroutine find_fault
@@ -94,7 +96,7 @@ contains
         moved = norm(sim%blocks%x(:, b) - fault%place(:, b))
         explained = dt*(fault%speed(b) + v + dt*norm(sim%case%fluid%gravity)) &
           + sim%grid%min_spacing()
-        if (moved > explained) call set(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
+        if (moved > explained) call set_fault(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
           //' m in a step of '//brief(dt)//' s, though its speed is '//brief(v) &
           //' m/s: its mass of '//brief(sim%blocks%mass(b))//' kg is too small for &run dt', fault)
       end associate
@@ -111,9 +113,9 @@ contains
       if (.not. sim%blocks%present(b)) cycle
       associate (x => sim%blocks%x(:, b))
         if (.not. all(ieee_is_finite(x)) .or. .not. all(ieee_is_finite(sim%blocks%v(:, b)))) then
-          call set(sim, 'body '//to_text(b)//': its place or speed is not a number', fault)
+          call set_fault(sim, 'body '//to_text(b)//': its place or speed is not a number', fault)
         else if (has_left(sim%grid, sim%case%fluid%gravity, x, sim%blocks%v(:, b))) then
-          call set(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x)//') m', fault)
+          call set_fault(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x)//') m', fault)
         end if
       end associate
     end do
@@ -144,21 +146,8 @@ contains
     end do
   end function has_left
 
-  !> Faults that show only when the time is over: blocks that never found room.
-  subroutine find_final_fault(sim, fault)
-    type(simulation_t), intent(in) :: sim
-    type(fault_t), intent(inout) :: fault
-    character(:), allocatable :: why
-    integer :: n
-
-    n = n_pending(sim%clock%t, sim%blocks)
-    if (n == 0) return
-    why = ''
-    if (sim%clock%settled()) why = ', and all others are at rest'
-    call set(sim, to_text(n)//' due block(s) never found room'//why, fault)
-  end subroutine find_final_fault
-
-  subroutine set(sim, what, fault)
+  !> Keep the first fault, with its time and step.
+  subroutine set_fault(sim, what, fault)
     type(simulation_t), intent(in) :: sim
     character(*), intent(in) :: what
     type(fault_t), intent(inout) :: fault
@@ -166,6 +155,6 @@ contains
     if (fault%code /= exit_ok) return
     fault%code = exit_numerics
     fault%message = 't = '//to_text(sim%clock%t)//' s, step '//to_text(sim%clock%step)//': '//what
-  end subroutine set
+  end subroutine set_fault
 
 end module faults_m

@@ -6,17 +6,16 @@ program mics
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
-  use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
+  use errors_m, only: problems_t, fatal, to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use stack_limit_m, only: check_stack
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, stop_asked
   use timers_m, only: wall_clock
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
-  use case_file_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case
-  use named_files_m, only: look_beside
+  use named_files_m, only: read_case_text, look_beside
   use placing_table_m, only: read_places
   use motion_file_m, only: read_motions
   use reference_m, only: reference_text
@@ -25,7 +24,7 @@ program mics
   use case_warnings_m, only: find_case_warnings
   use set_up_file_m, only: write_set_up
   use all_parameters_m, only: all_parameters
-  use memory_plan_m, only: require_memory, require_memory_to_start
+  use memory_plan_m, only: require_memory
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
@@ -35,7 +34,8 @@ program mics
   use diagnostics_m, only: step_report_t
   use simulation_m, only: simulation_t, simulation_init, resume, measure
   use step_m, only: take_step, measure_overlap
-  use faults_m, only: fault_t, store_places, find_fault, find_final_fault
+  use faults_m, only: fault_t, store_places, find_fault, set_fault
+  use release_m, only: n_pending
   implicit none
   save   ! keeps the state off the stack
   type(options_t) :: options
@@ -54,7 +54,7 @@ program mics
   call parallel_init()
   began = wall_clock()
   call read_options()
-  call require_memory_to_start()
+  call require_memory()
   call read_and_check()
   call require_memory(case, shapes)
   call catch_signals()
@@ -81,7 +81,12 @@ program mics
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)
   end do
-  if (fault%code == exit_ok .and. sim%clock%finished()) call find_final_fault(sim, fault)
+  if (sim%clock%finished() .and. n_pending(sim%clock%t, sim%blocks) > 0) then
+    message = ''
+    if (sim%clock%settled()) message = ', and all others are at rest'
+    call set_fault(sim, to_text(n_pending(sim%clock%t, sim%blocks)) &
+      //' due block(s) never found room'//message, fault)
+  end if
 
   code = fault%code
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
@@ -129,7 +134,8 @@ contains
     logical :: there
     integer :: n
 
-    if (is_root()) call read_text(options%case_file, text, problems)   ! mpirun gives it the input
+    ! mpirun gives the root process the input
+    if (is_root()) call read_case_text(options%case_file, text, problems)
     n = problems%n
     call broadcast(n)
     if (n > 0) call refuse(problems)

@@ -24,7 +24,7 @@ module simulation_m
   use overlap_m, only: overlap_t, overlap_init
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
-  use energy_m, only: energy_parts_t, energy_init, begin_energy, energy_excess
+  use energy_m, only: energy_parts_t, energy_init, put_in_energy, energy_excess
   use coupling_m, only: coupling_t, copy_motion
   use light_m, only: light_init, resume_light
   use monolithic_m, only: monolithic_t, monolithic_init
@@ -168,8 +168,12 @@ contains
 
     if (.not. sim%wet) return
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    if (sim%clock%step == 0) call begin_energy(energies(sim, report%fluid, 0.0_wp), &
-      report%fluid%potential - energy_of_level(sim%case%fluid, sim%grid, sim%flow%c), sim%energy)
+    if (sim%clock%step == 0) then
+      call put_in_energy(energies(sim, report%fluid, 0.0_wp), sim%energy)
+      ! what the liquid sets free when it comes to lie level counts from the start
+      sim%energy%set_free = sim%energy%parts%kinetic + max(0.0_wp, report%fluid%potential &
+        - energy_of_level(sim%case%fluid, sim%grid, sim%flow%c))
+    end if
     report%energy_excess = energy_excess(sim%energy)
   end subroutine measure
 

@@ -41,15 +41,15 @@ module step_m
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
   use rigid_body_m, only: follow_motions, look_ahead
-  use contacts_m, only: contact_report_t, move_blocks
+  use contacts_m, only: move_blocks
   use block_record_m, only: update_record
   use ground_m, only: stands
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_deep, store_points, warn_of_overlaps
   use release_m, only: release_due_blocks, let_go_lowered, take_out, next_release, nothing_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
-  use energy_m, only: store_energy, store_release, energy_excess
-  use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
+  use energy_m, only: store_energy, put_in_energy, energy_excess
+  use coupling_m, only: copy_motion, start_of_stages, motion_after_fluid
   use added_mass_m, only: update_added_mass
   use courant_m, only: courant_rate_t, courant_rate
   use simulation_m, only: simulation_t, energies
@@ -68,11 +68,10 @@ contains
   subroutine take_step(sim, report)
     type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(out) :: report
-    type(contact_report_t) :: contact
-    type(coupling_report_t) :: coupling_report
     type(time_step_t) :: time_step
     type(stage_t) :: stage
-    real(wp) :: dt_before   !! of the last step [s]
+    real(wp) :: dt_before   ! of the last step [s]
+    real(wp) :: depth       ! [m]
 
     dt_before = sim%clock%dt
     ! 1 release
@@ -86,7 +85,7 @@ contains
       ! 4 bodies
       call tic(sim%timer_blocks)
       if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%initialised, sim%light)
-      call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
+      call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, report%contact)
       if (sim%light%on) call store_water_force(case%fluid%gravity, dt, blocks, sim%light)
       call toc(sim%timer_blocks)
       if (sim%wet) then
@@ -121,20 +120,23 @@ contains
         ! 12 faces
         call coupling%predict_faces(stage)
         ! 13 projection
-        call coupling%project(stage, coupling_report)
+        call coupling%project(stage, report%coupling)
         ! 14 closing
         call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
-        call coupling%close(stage, blocks, coupling_report)
+        call coupling%close(stage, blocks, report%coupling)
         call toc(sim%timer_velocity)
       end if
     end associate
     call sim%clock%advance()
-    call describe(sim, contact, coupling_report, report)
+    call describe(sim, report)
     report%overlap_known = .false.
     if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
     else if (sim%contacts%detected%exact) then
-      call look_for_deep(sim)
+      call tic(sim%timer_blocks)   ! for warnings and faults only where bodies have deep contacts
+      call ask_for_deep(sim%contacts%detected%points, sim%blocks, sim%deep)
+      call max_overlap(sim%walls, sim%blocks, sim%overlap, depth, sim%deep)
+      call toc(sim%timer_blocks)
     end if
     if (.not. sim%contacts%detected%exact) call store_points(sim%contacts%detected%points, sim%deep)
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
@@ -153,29 +155,12 @@ contains
     report%overlap_known = .true.
   end subroutine measure_overlap
 
-  !> The same only where bodies have deep contacts: for warnings and faults between rows.
-  subroutine look_for_deep(sim)
-    type(simulation_t), intent(inout) :: sim
-    real(wp) :: depth
-
-    call tic(sim%timer_blocks)
-    call ask_for_deep(sim%contacts%detected%points, sim%blocks, sim%deep)
-    call max_overlap(sim%walls, sim%blocks, sim%overlap, depth, sim%deep)
-    call toc(sim%timer_blocks)
-  end subroutine look_for_deep
-
   !> What the parts of the step found out, in one report.
-  subroutine describe(sim, contact, stage, report)
+  subroutine describe(sim, report)
     type(simulation_t), intent(inout) :: sim
-    type(contact_report_t), intent(in) :: contact
-    type(coupling_report_t), intent(in) :: stage
     type(step_report_t), intent(inout) :: report
     logical :: any_free, all_there   ! nothing else moves or is to come, but for lack of room
 
-    report%contact_energy = contact%energy
-    report%contact_courant_max = contact%courant_max
-    report%substeps = contact%substeps
-    report%contacts_solved = contact%info == 0
     any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
     call update_record(sim%clock%t, sim%clock%dt, sim%case%run%rest_speed, sim%blocks)
     all_there = any_free .and. nothing_to_come(sim%clock%t, sim%blocks)
@@ -185,13 +170,8 @@ contains
       sim%clock%rest_began = sim%clock%t
     end if
     if (.not. sim%wet) return
-    report%divergence_max = stage%pressure%divergence
-    report%pressure_passes = stage%pressure%passes
-    report%solver_iterations = stage%pressure%iterations
-    report%pressure_converged = stage%pressure%converged
-    report%viscous_converged = stage%viscous_converged
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    call store_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
+    call store_energy(energies(sim, report%fluid, report%contact%energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%subcycles
     report%transport_converged = sim%transport%liquid%small%converged
@@ -219,7 +199,7 @@ contains
       call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
       call mix_fluid(sim%case%fluid, sim%flow)
       fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-      call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
+      call put_in_energy(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
     end if
     if (any(sim%blocks%present .and. .not. sim%initialised)) call first_forces(sim)
   end subroutine release

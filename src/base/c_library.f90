@@ -5,11 +5,11 @@ module c_library_m
   use system_m, only: c_errno_place
   implicit none
   private
-  public :: c_access, c_close, c_closedir, c_dup, c_errno, c_exit, c_faccessat, c_fclose, &
-    c_fdopen, c_ferror, c_fflush, c_fileno, c_flock, c_fopen, c_fread, c_fstat, c_fsync, &
-    c_ftruncate, c_fwrite, c_gethostname, c_getpid, c_getrlimit, c_isatty, c_lseek, c_mkdir, &
-    c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_renameat, c_setenv, &
-    c_signal, c_stat, c_strerror, c_unlink, c_unlinkat, c_usleep
+  public :: c_close, c_closedir, c_dup, c_errno, c_exit, c_faccessat, c_fclose, c_fileno, &
+    c_flock, c_fopen, c_fstat, c_fsync, c_ftruncate, c_gethostname, c_getpid, c_getrlimit, &
+    c_isatty, c_lseek, c_mkdir, c_open, c_opendir, c_pread, c_pwrite, c_read, c_readdir, &
+    c_realpath, c_rename, c_renameat, c_setenv, c_signal, c_stat, c_strerror, c_unlink, &
+    c_unlinkat, c_usleep
   public :: text_at, text_of_letters
 
   integer, parameter, public :: max_path = 4096   !! PATH_MAX of Linux
@@ -22,41 +22,6 @@ module c_library_m
       implicit none
       character(kind=c_char), intent(in) :: path(*), mode(*)
     end function c_fopen
-
-    type(c_ptr) function c_fdopen(fd, mode) bind(c, name='fdopen')
-      import :: c_char, c_int, c_ptr
-      implicit none
-      integer(c_int), value :: fd
-      character(kind=c_char), intent(in) :: mode(*)
-    end function c_fdopen
-
-    integer(c_size_t) function c_fread(buffer, size, count, stream) bind(c, name='fread')
-      import :: c_ptr, c_size_t
-      implicit none
-      type(c_ptr), value :: buffer
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-    end function c_fread
-
-    integer(c_size_t) function c_fwrite(buffer, size, count, stream) bind(c, name='fwrite')
-      import :: c_char, c_ptr, c_size_t
-      implicit none
-      character(kind=c_char), intent(in) :: buffer(*)
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-    end function c_fwrite
-
-    integer(c_int) function c_ferror(stream) bind(c, name='ferror')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_ferror
-
-    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_fflush
 
     integer(c_int) function c_fclose(stream) bind(c, name='fclose')
       import :: c_int, c_ptr
@@ -122,12 +87,20 @@ module c_library_m
       integer(c_int), value :: fd
     end function c_dup
 
-    integer(c_size_t) function c_pread(fd, buffer, count, offset) bind(c, name='pread')
-      import :: c_int, c_long, c_ptr, c_size_t
+    integer(c_size_t) function c_read(fd, buffer, count) bind(c, name='read')
+      import :: c_char, c_int, c_size_t
       implicit none
       integer(c_int), value :: fd
-      type(c_ptr), value :: buffer
       integer(c_size_t), value :: count
+      character(kind=c_char), intent(inout) :: buffer(count)
+    end function c_read
+
+    integer(c_size_t) function c_pread(fd, buffer, count, offset) bind(c, name='pread')
+      import :: c_char, c_int, c_long, c_size_t
+      implicit none
+      integer(c_int), value :: fd
+      integer(c_size_t), value :: count
+      character(kind=c_char), intent(inout) :: buffer(count)
       integer(c_long), value :: offset
     end function c_pread
 
@@ -182,13 +155,6 @@ module c_library_m
       implicit none
       character(kind=c_char), intent(in) :: path(*)
     end function c_unlink
-
-    integer(c_int) function c_access(path, mode) bind(c, name='access')
-      import :: c_char, c_int
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: mode
-    end function c_access
 
     integer(c_int) function c_rename(from, to) bind(c, name='rename')
       import :: c_char, c_int

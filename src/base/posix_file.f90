@@ -3,14 +3,13 @@
 !! The first error sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.
 module posix_file_m
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_long, c_null_char, c_null_ptr, &
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_null_char, c_null_ptr, &
     c_ptr, c_size_t, c_associated
-  use c_library_m, only: c_close, c_errno, c_fclose, c_ferror, c_fflush, c_fileno, c_flock, &
-    c_fopen, c_fread, c_fstat, c_ftruncate, c_fwrite, c_lseek, c_open, c_pread, c_stat, &
-    c_strerror, stat_size, text_at, text_of_letters
+  use c_library_m, only: c_close, c_errno, c_fclose, c_fileno, c_flock, c_fopen, c_fstat, &
+    c_ftruncate, c_lseek, c_open, c_pread, c_pwrite, c_stat, c_strerror, stat_size, text_at
   implicit none
   private
-  public :: posix_file_t, is_pipe, is_file_at, system_reason
+  public :: posix_file_t, is_pipe, is_file_at, all_written, system_reason
   public :: lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
@@ -21,6 +20,7 @@ module posix_file_m
     integer :: info = 0                    !! 0: no error so far
     character(:), allocatable :: message   !! file and reason of the first error
     type(c_ptr), private :: stream = c_null_ptr
+    integer(c_int) :: number = -1          !! of the open file in this process
   contains
     procedure :: open => file_open
     procedure :: close => file_close
@@ -28,7 +28,7 @@ module posix_file_m
     procedure :: rewrite => file_rewrite
     procedure :: read => file_read
     procedure :: lock => file_lock
-    procedure :: is_at, content
+    procedure :: content
     procedure, private :: check
   end type posix_file_t
 
@@ -67,6 +67,7 @@ contains
     end if
     self%stream = c_fopen(path//c_null_char, mode//c_null_char)
     call self%check(c_associated(self%stream), 'open the file')
+    if (self%info == 0) self%number = c_fileno(self%stream)
   end subroutine file_open
 
   !> Close the file; done even after an error. A lock ends with it.
@@ -76,18 +77,16 @@ contains
     if (.not. c_associated(self%stream)) return
     call self%check(c_fclose(self%stream) == 0, 'close the file')
     self%stream = c_null_ptr
+    self%number = -1
   end subroutine file_close
 
-  !> Write bytes and hand them to the system at once.
-  subroutine file_write(self, bytes)
+  !> Write bytes from a place in the file on.
+  subroutine file_write(self, place, bytes)
     class(posix_file_t), intent(inout) :: self
+    integer(c_long), intent(in) :: place   !! from 0
     character(*), intent(in) :: bytes
-    integer(c_size_t) :: n
 
-    if (self%info /= 0) return
-    n = len(bytes, kind=c_size_t)
-    call self%check(c_fwrite(bytes, 1_c_size_t, n, self%stream) == n, 'write')
-    if (self%info == 0) call self%check(c_fflush(self%stream) == 0, 'write')
+    if (self%info == 0) call self%check(all_written(self%number, place, bytes), 'write')
   end subroutine file_write
 
   !> Replace all that the file holds.
@@ -96,35 +95,30 @@ contains
     character(*), intent(in) :: bytes
 
     if (self%info /= 0) return
-    call self%check(c_ftruncate(c_fileno(self%stream), 0_c_long) == 0, 'write')
-    call self%write(bytes)
+    call self%check(c_ftruncate(self%number, 0_c_long) == 0, 'write')
+    call self%write(0_c_long, bytes)
   end subroutine file_rewrite
 
-  !> Read the next bytes, at most as many as `bytes` holds.
-  subroutine file_read(self, bytes, n)
+  !> Read the bytes from a place in the file on, at most as many as `bytes` holds.
+  subroutine file_read(self, place, bytes, n)
     class(posix_file_t), intent(inout) :: self
-    character(:), allocatable, target, intent(inout) :: bytes
-    integer, intent(out) :: n   !! how many there were; 0 at the end of the file
+    integer(c_long), intent(in) :: place   !! from 0
+    character(:), allocatable, intent(inout) :: bytes
+    integer, intent(out) :: n              !! how many there were; 0 at the end of the file
 
     n = 0
     if (self%info /= 0) return
-    n = int(c_fread(c_loc(bytes), 1_c_size_t, len(bytes, kind=c_size_t), self%stream))
-    call self%check(c_ferror(self%stream) == 0, 'read')
+    n = int(c_pread(self%number, bytes, len(bytes, c_size_t), place))
+    call self%check(n >= 0, 'read')
   end subroutine file_read
 
   !> What a short file holds now, wherever it was read or written last.
   function content(self) result(text)
     class(posix_file_t), intent(in) :: self
     character(:), allocatable :: text
-    integer, parameter :: longest = 400
-    character(kind=c_char), target :: letter(longest)
-    integer(c_size_t) :: n
+    character(400) :: bytes
 
-    text = ''
-    if (.not. c_associated(self%stream)) return
-    letter = c_null_char
-    n = c_pread(c_fileno(self%stream), c_loc(letter), int(longest, c_size_t), 0_c_long)
-    if (n > 0) text = text_of_letters(letter)
+    text = bytes(:max(0_c_size_t, c_pread(self%number, bytes, len(bytes, c_size_t), 0_c_long)))
   end function content
 
   !> Try to take a lock on the open file; it ends when the file is closed or the program ends.
@@ -139,7 +133,7 @@ contains
     outcome = lock_unknown
     if (self%info /= 0) return
     outcome = lock_taken
-    if (c_flock(c_fileno(self%stream), merge(exclusive, shared, alone) + at_once) == 0) return
+    if (c_flock(self%number, merge(exclusive, shared, alone) + at_once) == 0) return
     number = c_errno()
     outcome = merge(lock_refused, lock_unknown, any(number == would_wait))
   end subroutine file_lock
@@ -160,17 +154,8 @@ contains
     if (c_close(fd) /= 0) return
   end function is_pipe
 
-  !> Does a path lead to this open file, and not to another that has its name now?
-  function is_at(self, path) result(yes)
-    class(posix_file_t), intent(in) :: self
-    character(*), intent(in) :: path
-    logical :: yes
-
-    yes = c_associated(self%stream)
-    if (yes) yes = is_file_at(c_fileno(self%stream), path)
-  end function is_at
-
-  !> The same for the open file of a number: device and inode say it.
+  !> Does a path lead to the file that is open under a number, and not to another that has its name
+  !! now? Device and inode say it.
   function is_file_at(fd, path) result(yes)
     integer(c_int), intent(in) :: fd
     character(*), intent(in) :: path
@@ -181,5 +166,22 @@ contains
     if (yes) yes = c_stat(path//c_null_char, found) == 0
     if (yes) yes = all(held(:2) == found(:2))
   end function is_file_at
+
+  !> Write bytes from a place in an open file on, all of them; false after an error.
+  function all_written(fd, place, bytes) result(well)
+    integer(c_int), intent(in) :: fd
+    integer(c_long), intent(in) :: place   !! from 0
+    character(*), intent(in) :: bytes
+    logical :: well
+    integer(c_size_t) :: there, n
+
+    there = 0
+    do while (there < len(bytes))
+      n = c_pwrite(fd, bytes(there + 1:), len(bytes, c_size_t) - there, place + there)
+      if (n <= 0) exit
+      there = there + n
+    end do
+    well = there == len(bytes)
+  end function all_written
 
 end module posix_file_m

@@ -1,88 +1,45 @@
 !> The bytes of a file and what makes text of them: UTF-8 or Latin-1, line ends of every system, a
 !! byte-order mark. Each procedure takes a time in proportion to the size.
 module text_file_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
-    c_associated, c_loc
-  use kinds_m, only: i8
-  use c_library_m, only: c_fclose, c_fdopen, c_ferror, c_fopen, c_fread
-  use string_builder_m, only: string_builder_t
+  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_null_char
+  use c_library_m, only: c_close, c_open, c_read
   use value_text_m, only: byte_order_mark
   implicit none
   private
-  public :: read_bytes, read_stream, to_utf8, plain_lines
+  public :: read_bytes, to_utf8, plain_lines
 
   character(*), parameter :: line_feed = achar(10), carriage_return = achar(13)
 
 contains
 
-  !> All bytes of a file; more than `most` are a problem that is found before they are read.
+  !> All bytes of a file, a pipe or a device, or of standard input if `file` is empty; more than
+  !! `most` are a problem.
   subroutine read_bytes(file, most, text, problem)
     character(*), intent(in) :: file
     integer, intent(in) :: most
     character(:), allocatable, intent(out) :: text
     character(:), allocatable, intent(out) :: problem   !! empty: none
-    integer(i8) :: length
-    integer :: unit, status
+    integer(c_size_t) :: n, got
+    integer(c_int) :: number
 
-    text = ''
-    problem = ''
-    inquire (file=file, size=length)
-    open (newunit=unit, file=file, access='stream', form='unformatted', action='read', &
-          status='old', iostat=status)
-    if (status /= 0) then
-      problem = 'there is no such file, or it may not be read'
-      return
-    end if
-    if (length > most) then
-      problem = 'too long'
-    else
-      deallocate (text)
-      allocate (character(max(length, 0_i8)) :: text)
-      read (unit, iostat=status) text
-      if (status /= 0) problem = 'could not be read'
-    end if
-    close (unit)
-  end subroutine read_bytes
-
-  !> The same of a pipe or a device, or of standard input if `file` is empty: read through the C
-  !! library to its end, or until it is too long.
-  subroutine read_stream(file, most, text, problem)
-    character(*), intent(in) :: file
-    integer, intent(in) :: most
-    character(:), allocatable, intent(out) :: text, problem
-    integer, parameter :: length = 8192   ! of a piece, short enough for a small stack
-    character(kind=c_char), target :: piece(length)
-    character(length) :: part
-    type(string_builder_t) :: whole
-    type(c_ptr) :: stream
-    integer :: n, i, total, status
-
-    text = ''
-    problem = ''
-    if (len(file) == 0) then
-      stream = c_fdopen(0_c_int, 'r'//c_null_char)
-    else
-      stream = c_fopen(file//c_null_char, 'r'//c_null_char)
-    end if
-    if (.not. c_associated(stream)) then
-      problem = 'there is no such file, or it may not be read'
-      return
-    end if
-    total = 0
+    number = 0   ! of standard input
+    if (len(file) > 0) number = c_open(file//c_null_char, 0_c_int)
+    text = repeat(' ', 8192)
+    n = 0
     do
-      n = int(c_fread(c_loc(piece), 1_c_size_t, size(piece, kind=c_size_t), stream))
-      total = total + n
-      if (n == 0 .or. total > most) exit
-      do i = 1, n
-        part(i:i) = piece(i)
-      end do
-      call whole%add(part(:n))
+      if (n == len(text)) text = text//repeat(' ', len(text))
+      got = c_read(number, text(n + 1:), len(text) - n)
+      if (got <= 0) exit
+      n = n + got
+      if (n > most) exit
     end do
-    text = whole%text()
-    if (total > most) problem = 'too long'
-    if (c_ferror(stream) /= 0) problem = 'could not be read'
-    status = c_fclose(stream)
-  end subroutine read_stream
+    text = text(:n)
+    problem = ''
+    if (n > most) problem = 'too long'
+    if (got < 0) problem = 'could not be read'
+    if (got < 0 .and. n == 0) problem = 'there is no such file, or it may not be read'
+    if (c_close(number) /= 0) return   ! there was none
+  end subroutine read_bytes
 
   !> A text that is not well formed in UTF-8 is taken as Latin-1, where each byte is a character:
   !! two bytes for each that is not ASCII.

@@ -4,7 +4,7 @@ module allowed_values_m
   use errors_m, only: to_text
   implicit none
   private
-  public :: allowed_t, any_number, positive, not_negative, share, any_whole, at_least, between
+  public :: allowed_t, any_number, positive, not_negative, share, whole, between
 
   real(wp), parameter :: boundless = huge(1.0_wp)
 
@@ -20,6 +20,8 @@ module allowed_values_m
     procedure :: words => allowed_words
     procedure :: bounded_below, bounded_above
   end type allowed_t
+
+  type(allowed_t), parameter :: whole = allowed_t(whole=.true.)   !! any whole number
 
   !> From the first to the second number, both included.
   interface between
@@ -57,19 +59,6 @@ contains
 
     allowed = allowed_t(unit='-', low=0.0_wp, with_low=.false., high=1.0_wp)
   end function share
-
-  pure function any_whole() result(allowed)
-    type(allowed_t) :: allowed
-
-    allowed = allowed_t(whole=.true.)
-  end function any_whole
-
-  pure function at_least(low) result(allowed)
-    integer, intent(in) :: low
-    type(allowed_t) :: allowed
-
-    allowed = allowed_t(whole=.true., low=real(low, wp))
-  end function at_least
 
   pure function between_reals(low, high, unit) result(allowed)
     real(wp), intent(in) :: low, high

@@ -5,7 +5,7 @@ module block_groups_m
   use errors_m, only: to_text
   use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
     bed_input_t, start_t, handling_t, absent, is_given, size_count, max_variants
-  use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
+  use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, whole, &
     between
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: shortest
@@ -194,7 +194,7 @@ contains
     type(shape_input_t), intent(inout) :: shape
     character(*), parameter :: kind = 'kind = ''rock''  '
 
-    call v%integer('seed', shape%seed, any_whole(), 'for kind = ''rock'': the stones; another ' &
+    call v%integer('seed', shape%seed, whole, 'for kind = ''rock'': the stones; another ' &
       //'number draws others, the same number the same on every machine', example=kind//'seed = 7')
     call v%integer('variants', shape%variants, between(1, max_variants), 'for kind = ''rock'': ' &
       //'stones of the family, NAME-01 and so on; each drop draws one, each &body takes the next', &
@@ -312,7 +312,7 @@ contains
     call visit_attitude(v, drop%quaternion)
     call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
       'each block is tilted at random by up to this about an axis at random', example='10')
-    call v%integer('seed', drop%seed, any_whole(), 'the random places and attitudes: ' &
+    call v%integer('seed', drop%seed, whole, 'the random places and attitudes: ' &
       //'another number draws others, the same number the same on every machine', example='7')
     call visit_handling(v, drop%handling)
     call v%without_meaning(drop%handling%lowering_speed > 0.0_wp, 'velocity', &

@@ -12,7 +12,7 @@ module case_input_m
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t, shape_input_t, is_given, has_flow, member_name, max_variants
   use boundary_kinds_m, only: side_code, gives_pressure
-  use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
+  use namelist_text_m, only: group_text_t, cut_groups
   use string_builder_m, only: string_builder_t
   use entries_m, only: words_of
   use group_visitor_m, only: group_visitor_t
@@ -29,7 +29,7 @@ module case_input_m
   !> The groups of the contract; those from `first_repeated` on may be repeated.
   character(name_length), parameter :: group_names(*) = [character(name_length) :: 'run', 'grid', &
     'boundary', 'fluid', 'numerics', 'contact', 'bed', 'start', 'water', 'shape', 'body', 'drop']
-  integer, parameter :: first_repeated = 9
+  integer, parameter :: first_repeated = 9, g_water = 9, g_shape = 10, g_body = 11, g_drop = 12
 
 contains
 
@@ -39,7 +39,7 @@ contains
     type(case_t), intent(out) :: case
     type(problems_t), intent(inout) :: problems
     type(problems_t), intent(out), optional :: passed_over   !! given, but idle with `physics`
-    type(namelist_text_t) :: list
+    type(group_text_t), allocatable :: list(:)
     type(group_visitor_t) :: v
     character(name_length), allocatable :: shapes(:)
     integer :: i, g
@@ -50,23 +50,24 @@ contains
     case%text = text
     v%problems = problems
     call cut_groups(text, list, v%problems)
-    allocate (case%water(count_groups(list, 'water')), case%shape(count_groups(list, 'shape')))
-    allocate (case%body(count_groups(list, 'body')), case%drop(count_groups(list, 'drop')))
+    n = [(count([(list(i)%name == group_names(g), i=1, size(list))]), g=1, size(n))]
+    allocate (case%water(n(g_water)), case%shape(n(g_shape)), case%body(n(g_body)), &
+              case%drop(n(g_drop)))
     shapes = shape_names(list)
     n = 0
-    do i = 1, list%n
-      call v%start(list%group(i))
-      g = findloc(group_names == list%group(i)%name, .true., 1)
+    do i = 1, size(list)
+      call v%start(list(i))
+      g = findloc(group_names == list(i)%name, .true., 1)
       if (g == 0) then
         call v%report(': unknown group, nearest known: &' &
-                      //nearest_name(printable(list%group(i)%name), group_names))
+                      //nearest_name(printable(list(i)%name), group_names))
       else if (n(g) > 0 .and. .not. is_repeated(g)) then
         call v%report(': the group is given twice, first on line '//to_text(first_line(g)))
       else
-        if (n(g) == 0) first_line(g) = list%group(i)%line
+        if (n(g) == 0) first_line(g) = list(i)%line
         n(g) = n(g) + 1
         call visit_group(v, case, group_names(g), n(g), shapes)
-        list%group(i) = v%group   ! remembers which variables are faulty
+        list(i) = v%group   ! remembers which variables are faulty
       end if
     end do
     do g = 1, 2   ! run and grid hold required variables
@@ -141,19 +142,6 @@ contains
     case%fluid%initial_state = ''
   end subroutine set_empty
 
-  !> Number of groups of a name.
-  pure function count_groups(list, name) result(n)
-    type(namelist_text_t), intent(in) :: list
-    character(*), intent(in) :: name
-    integer :: n
-    integer :: i
-
-    n = 0
-    do i = 1, list%n
-      if (list%group(i)%name == name) n = n + 1
-    end do
-  end function count_groups
-
   !> Read one group: the n-th of its name.
   subroutine visit_group(v, case, name, n, shapes)
     type(group_visitor_t), intent(inout) :: v
@@ -226,20 +214,20 @@ contains
   !> The names the shapes of the case were given, right or wrong, and those of the stones of
   !! families.
   pure function shape_names(list) result(names)
-    type(namelist_text_t), intent(in) :: list
+    type(group_text_t), intent(in) :: list(:)
     character(name_length), allocatable :: names(:)
     type(shape_input_t) :: family, by_default
     integer :: i, k, info
 
     allocate (names(0))
-    do i = 1, list%n
-      if (list%group(i)%name /= 'shape') cycle
-      family = shape_input_t(name=first_value(list%group(i), 'name'), &
-        kind=first_value(list%group(i), 'kind'))
+    do i = 1, size(list)
+      if (list(i)%name /= 'shape') cycle
+      family = shape_input_t(name=first_value(list(i), 'name'), &
+        kind=first_value(list(i), 'kind'))
       names = [character(name_length) :: names, family%name]
       if (family%kind /= 'rock') cycle
-      if (first_value(list%group(i), 'variants') /= '') then   ! as far as it can be read
-        call parse_integer(trim(first_value(list%group(i), 'variants')), family%variants, info)
+      if (first_value(list(i), 'variants') /= '') then   ! as far as it can be read
+        call parse_integer(trim(first_value(list(i), 'variants')), family%variants, info)
         if (family%variants < 1 .or. family%variants > max_variants) family%variants = &
           by_default%variants
       end if
@@ -258,12 +246,12 @@ contains
     text = ''
     j = group%find(variable)
     if (j == 0) return
-    if (group%assignment(j)%n > 0) text = group%assignment(j)%value(1)%text
+    if (size(group%assignment(j)%value) > 0) text = group%assignment(j)%value(1)%text
   end function first_value
 
   !> Checks across groups.
   subroutine check_together(list, case, v)
-    type(namelist_text_t), intent(inout) :: list
+    type(group_text_t), intent(inout) :: list(:)
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
     integer :: d, i
@@ -274,7 +262,7 @@ contains
     call find_idle(list, case, v)
     i = first_of(list, 'grid')
     if (i == 0 .or. case%grid%cells_faulty) return
-    call v%start(list%group(i))
+    call v%start(list(i))
     do d = 1, 3
       if (case%grid%cells(d) /= 1 .or. any(case%boundary%faulty(:, d))) cycle
       call v%require('cells', all(case%boundary%kind(:, d) == 'slip') .or. &
@@ -287,7 +275,7 @@ contains
   !> Look through all groups of a case that has been read: one warning for all groups of a name
   !! without a meaning, then one for each group with variables without one.
   subroutine find_idle(list, case, v)
-    type(namelist_text_t), intent(inout) :: list
+    type(group_text_t), intent(inout) :: list(:)
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
     character(:), allocatable :: chosen, groups, subject
@@ -300,10 +288,10 @@ contains
     associate (names => words_of(groups))
       do k = 1, size(names)
         n = 0
-        do i = list%n, 1, -1
-          if (list%group(i)%name /= names(k)) cycle
+        do i = size(list), 1, -1
+          if (list(i)%name /= names(k)) cycle
           n = n + 1
-          line = list%group(i)%line
+          line = list(i)%line
         end do
         subject = '&'//trim(names(k))//': has'
         if (n > 1) subject = to_text(n)//' groups &'//trim(names(k))//': have'
@@ -311,14 +299,14 @@ contains
           //', passed over', line)
       end do
     end associate
-    do i = 1, list%n
-      call v%start(list%group(i))
-      call v%pass_over(idle_variables(list%group(i)%name, case), chosen)
-      if (list%group(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
+    do i = 1, size(list)
+      call v%start(list(i))
+      call v%pass_over(idle_variables(list(i)%name, case), chosen)
+      if (list(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
         call v%report(': has no meaning with &fluid single_phase = .true.; the liquid fills the ' &
           //'whole tank')
       end if
-      list%group(i) = v%group
+      list(i) = v%group
     end do
   end subroutine find_idle
 
@@ -365,20 +353,18 @@ contains
 
   !> Number of the first group of a name; 0 if there is none.
   pure function first_of(list, name) result(i)
-    type(namelist_text_t), intent(in) :: list
+    type(group_text_t), intent(in) :: list(:)
     character(*), intent(in) :: name
     integer :: i
+    integer :: k
 
-    do i = 1, list%n
-      if (list%group(i)%name == name) return
-    end do
-    i = 0
+    i = findloc([(list(k)%name == name, k=1, size(list))], .true., 1)
   end function first_of
 
   !> What enters through an inflow must find a way out; an outflow needs a level to keep, and
   !! gravity along it.
   subroutine check_streams(list, case, v)
-    type(namelist_text_t), intent(in) :: list
+    type(group_text_t), intent(in) :: list(:)
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
     logical :: way_out
@@ -386,7 +372,7 @@ contains
 
     i = first_of(list, 'boundary')
     if (i == 0 .or. .not. has_flow(case%run)) return
-    call v%start(list%group(i))
+    call v%start(list(i))
     way_out = any(gives_pressure(side_code(case%boundary%kind)) .or. case%boundary%faulty)
     associate (fluid => case%fluid)
       do d = 1, 3
@@ -407,7 +393,7 @@ contains
 
   !> What a water without a flow has: a level between gravity and the sides, and a current along it.
   subroutine check_given_water(list, case, v)
-    type(namelist_text_t), intent(in) :: list
+    type(group_text_t), intent(in) :: list(:)
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
     character(*), parameter :: light = 'physics = ''light'' '
@@ -415,7 +401,7 @@ contains
 
     call v%start_empty('fluid')
     i = first_of(list, 'fluid')
-    if (i > 0) call v%start(list%group(i))
+    if (i > 0) call v%start(list(i))
     associate (fluid => case%fluid)
       call v%require('single_phase', .not. fluid%single_phase, light//'needs a level of the water')
       if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
@@ -428,7 +414,7 @@ contains
     end associate
     i = first_of(list, 'boundary')
     if (i == 0) return
-    call v%start(list%group(i))
+    call v%start(list(i))
     do d = 1, 3
       do s = 1, 2
         if (case%boundary%faulty(s, d)) cycle

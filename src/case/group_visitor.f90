@@ -85,7 +85,7 @@ contains
     character(:), allocatable :: nearest
     integer :: i
 
-    do i = 1, self%group%n
+    do i = 1, size(self%group%assignment)
       associate (name => self%group%assignment(i)%name)
         if (any(self%entry(:self%n)%name == name)) cycle
         nearest = nearest_name(name, self%entry(:self%n)%name)
@@ -273,7 +273,7 @@ contains
     i = self%lookup()
     if (i > 0) then
       values = x
-      do j = 1, self%group%assignment(i)%n
+      do j = 1, size(self%group%assignment(i)%value)
         call self%read_number(i, j, allowed%whole, values(j))
       end do
       problem = allowed%problem(pack(values, is_given(values)))
@@ -350,7 +350,7 @@ contains
     self%entry(self%n)%allowed%fewest = 1
     i = self%lookup()
     n = 0
-    if (i > 0) n = self%group%assignment(i)%n
+    if (i > 0) n = size(self%group%assignment(i)%value)
     do j = 1, n
       word = ''
       call self%read_text(i, word, j)
@@ -425,13 +425,13 @@ contains
       if (.not. self%good(entry%name)) i = 0
       if (i == 0) return
       fewest = merge(entry%allowed%fewest, entry%most, entry%allowed%fewest > 0)
-      associate (a => self%group%assignment(i))
-        if (a%n >= fewest .and. a%n <= entry%most) return
+      associate (a => self%group%assignment(i), n => size(self%group%assignment(i)%value))
+        if (n >= fewest .and. n <= entry%most) return
         what = to_text(fewest)
         if (entry%most > fewest) what = what//' to '//to_text(entry%most)
-        what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//' given, '//what &
+        what = to_text(n)//trim(merge(' value ', ' values', n == 1))//' given, '//what &
           //' needed'
-        do j = 2, a%n
+        do j = 2, n
           if (a%value(j)%quoted) cycle   ! else it may be a variable whose '=' was forgotten
           call parse_logical(a%value(j)%text, flag, info)
           if (info == value_ok .or. scan(lower_case(a%value(j)%text(1:1)), small) == 0) cycle
@@ -470,7 +470,7 @@ contains
 
     associate (a => self%group%assignment(i))
       must = 'must be '
-      if (a%n > 1) must = 'value '//to_text(j)//' must be '
+      if (size(a%value) > 1) must = 'value '//to_text(j)//' must be '
       if (whole) then
         call parse_integer(a%value(j)%text, n, info)
         if (info == value_ok) x = n

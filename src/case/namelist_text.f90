@@ -17,8 +17,7 @@ module namelist_text_m
   use value_text_m, only: lower_case, printable, quoted_text, parse_integer, value_ok
   implicit none
   private
-  public :: cut_groups
-  public :: namelist_text_t, group_text_t
+  public :: cut_groups, group_text_t
 
   !> One value as it stands in the text, without its quotes.
   type :: value_t
@@ -29,8 +28,7 @@ module namelist_text_m
   type :: assignment_t
     character(:), allocatable :: name      !! in small letters
     integer :: line = 0
-    integer :: n = 0                       !! number of values, repeat counts multiplied out
-    type(value_t), allocatable :: value(:)
+    type(value_t), allocatable :: value(:)  !! repeat counts multiplied out
     logical :: faulty = .false.            !! a problem with it has been reported already
   contains
     procedure :: shown => assignment_shown
@@ -39,17 +37,11 @@ module namelist_text_m
   type :: group_text_t
     character(:), allocatable :: name      !! in small letters, without '&'
     integer :: line = 0                    !! where the group begins
-    integer :: n = 0                       !! number of assignments
     type(assignment_t), allocatable :: assignment(:)
     logical :: faulty = .false.            !! damaged: assignments may be missing from it
   contains
     procedure :: find => group_find
   end type group_text_t
-
-  type :: namelist_text_t
-    integer :: n = 0                       !! number of groups
-    type(group_text_t), allocatable :: group(:)
-  end type namelist_text_t
 
   !> Where the reader stands in the text.
   type :: cursor_t
@@ -69,19 +61,20 @@ module namelist_text_m
 contains
 
   !> Cut the text of a case into its groups.
-  subroutine cut_groups(text, list, problems)
+  subroutine cut_groups(text, groups, problems)
     character(*), intent(in) :: text
-    type(namelist_text_t), intent(out) :: list
+    type(group_text_t), allocatable, intent(out) :: groups(:)
     type(problems_t), intent(inout) :: problems
     type(cursor_t) :: cursor
     type(group_text_t) :: group
     type(group_text_t), allocatable :: longer(:)
     character(:), allocatable :: ended
-    integer :: length
+    integer :: n, length
     logical :: stray_reported   ! text where only a group may stand
 
     cursor = start_of(text)
-    allocate (list%group(8))
+    allocate (groups(8))
+    n = 0
     stray_reported = .false.
     do
       call skip_blanks(cursor)
@@ -90,23 +83,24 @@ contains
         call read_group(cursor, group, problems)
         stray_reported = .false.
         if (len(group%name) == 0) cycle
-        if (list%n == size(list%group)) then
-          allocate (longer(2*list%n))
-          longer(:list%n) = list%group
-          call move_alloc(longer, list%group)
+        if (n == size(groups)) then
+          allocate (longer(2*n))
+          longer(:n) = groups
+          call move_alloc(longer, groups)
         end if
-        list%n = list%n + 1
-        list%group(list%n) = group
+        n = n + 1
+        groups(n) = group
         cycle
       end if
       ended = ''
-      if (list%n > 0) ended = ' ; &'//list%group(list%n)%name//' has ended with its ''/'''
+      if (n > 0) ended = ' ; &'//groups(n)%name//' has ended with its ''/'''
       length = index(cursor%text(cursor%at:), line_feed) - 1
       if (.not. stray_reported) call problems%add_message('text outside the groups: ' &
         //printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))//ended, cursor%line)
       stray_reported = .true.
       cursor%at = cursor%at + length
     end do
+    groups = groups(:n)
   end subroutine cut_groups
 
   !> Read one group from its '&' to its '/'.
@@ -121,7 +115,7 @@ contains
     cursor%at = cursor%at + 1
     group%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
       name_characters) - 1)))
-    allocate (group%assignment(16))
+    allocate (group%assignment(0))
     if (len(group%name) == 0) then
       call problems%add_message('''&'' without the name of a group', cursor%line)
       return
@@ -136,8 +130,9 @@ contains
       if (group_ends(cursor, group, problems)) exit
       if (next(cursor) == ',') then
         valued = .false.
-        if (group%n > 0) valued = group%assignment(group%n)%n > 0 .or. &
-          group%assignment(group%n)%faulty
+        associate (a => group%assignment)
+          if (size(a) > 0) valued = size(a(size(a))%value) > 0 .or. a(size(a))%faulty
+        end associate
         if (comma .or. .not. valued) call report(cursor, group, &
           'nothing in front of a comma; write every value', problems)
         comma = .true.
@@ -215,14 +210,17 @@ contains
     new%line = cursor%line
     new%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
       name_characters) - 1)))
-    allocate (new%value(4))
+    allocate (new%value(0))
     same = group%find(new%name)
-    if (group%n == max_variables .and. .not. group%faulty) then
-      call problems%add_message('&'//group%name//': more than '//to_text(max_variables) &
-                                //' variables in one group', new%line)
+    if (size(group%assignment) < max_variables) then
+      group%assignment = [group%assignment, new]
+    else   ! one problem; what follows is read over
+      if (.not. group%faulty) call problems%add_message('&'//group%name//': more than ' &
+        //to_text(max_variables)//' variables in one group', new%line)
       group%faulty = .true.
+      group%assignment(max_variables) = new
+      group%assignment(max_variables)%faulty = .true.
     end if
-    call append_assignment(group, new)
     call skip_blanks(cursor)
     if (next(cursor) == '(') then
       call report(cursor, group, 'parts of a list cannot be set; write the whole list, ' &
@@ -245,7 +243,7 @@ contains
     type(problems_t), intent(inout) :: problems
     type(value_t) :: value
     character(:), allocatable :: number
-    integer :: count, digits, info
+    integer :: count, digits, info, i
 
     count = 1
     digits = verify(cursor%text(cursor%at:), '0123456789') - 1
@@ -280,7 +278,7 @@ contains
       call take_path(cursor, value%text)
     end select
     if (.not. allocated(value%text)) return
-    if (group%n == 0) then
+    if (size(group%assignment) == 0) then
       if (.not. group%faulty) then
         call problems%add_message('&'//group%name//' '//printable(value%text) &
                                   //': no ''='' follows; write name = value', cursor%line)
@@ -288,7 +286,15 @@ contains
       group%faulty = .true.
       return
     end if
-    call append_value(cursor, group, value, count, problems)
+    associate (last => group%assignment(size(group%assignment)))
+      if (size(last%value) + count > max_values) then
+        call report(cursor, group, 'more than '//to_text(max_values)//' values', problems)
+        return
+      end if
+      do i = 1, count
+        last%value = [last%value, value]
+      end do
+    end associate
   end subroutine read_value
 
   !> A quoted string; left unallocated if its line ends first.
@@ -339,41 +345,14 @@ contains
     word = word//cursor%text(first:cursor%at - 1)
   end subroutine take_path
 
-  !> Add a value, `count` times, to the last assignment.
-  subroutine append_value(cursor, group, value, count, problems)
-    type(cursor_t), intent(in) :: cursor
-    type(group_text_t), intent(inout) :: group
-    type(value_t), intent(in) :: value
-    integer, intent(in) :: count
-    type(problems_t), intent(inout) :: problems
-    type(value_t), allocatable :: longer(:)
-    integer :: i
-
-    associate (last => group%assignment(group%n))
-      if (last%n + count > max_values) then
-        call report(cursor, group, 'more than '//to_text(max_values)//' values', problems)
-        return
-      end if
-      if (last%n + count > size(last%value)) then
-        allocate (longer(2*(last%n + count)))
-        longer(:last%n) = last%value(:last%n)
-        call move_alloc(longer, last%value)
-      end if
-      do i = 1, count
-        last%value(last%n + i) = value
-      end do
-      last%n = last%n + count
-    end associate
-  end subroutine append_value
-
   !> Report the last assignment if it ended up without a value.
   subroutine check_last(group, problems)
     type(group_text_t), intent(inout) :: group
     type(problems_t), intent(inout) :: problems
 
-    if (group%n == 0) return
-    associate (last => group%assignment(group%n))
-      if (last%n > 0 .or. last%faulty .or. group%faulty) return
+    if (size(group%assignment) == 0) return
+    associate (last => group%assignment(size(group%assignment)))
+      if (size(last%value) > 0 .or. last%faulty .or. group%faulty) return
       call problems%add_message('&'//group%name//' '//last%name//' = : the value is missing', &
                                 last%line)
       last%faulty = .true.
@@ -387,12 +366,12 @@ contains
     character(*), intent(in) :: what
     type(problems_t), intent(inout) :: problems
 
-    if (group%n == 0) then
+    if (size(group%assignment) == 0) then
       if (.not. group%faulty) call problems%add_message('&'//group%name//': '//what, cursor%line)
       group%faulty = .true.
       return
     end if
-    associate (last => group%assignment(group%n))
+    associate (last => group%assignment(size(group%assignment)))
       if (.not. last%faulty) then
         call problems%add_message('&'//group%name//' '//last%name//': '//what, cursor%line)
       end if
@@ -400,33 +379,13 @@ contains
     end associate
   end subroutine report
 
-  !> Add an assignment to the group.
-  subroutine append_assignment(group, new)
-    type(group_text_t), intent(inout) :: group
-    type(assignment_t), intent(in) :: new
-    type(assignment_t), allocatable :: longer(:)
-
-    if (group%n == max_variables) then   ! once; what follows is read over
-      group%assignment(group%n) = new
-      group%assignment(group%n)%faulty = .true.
-      return
-    end if
-    if (group%n == size(group%assignment)) then
-      allocate (longer(2*group%n))
-      longer(:group%n) = group%assignment
-      call move_alloc(longer, group%assignment)
-    end if
-    group%n = group%n + 1
-    group%assignment(group%n) = new
-  end subroutine append_assignment
-
   !> Number of the first assignment to `name`; 0 if there is none.
   pure function group_find(self, name) result(i)
     class(group_text_t), intent(in) :: self
     character(*), intent(in) :: name
     integer :: i
 
-    do i = 1, self%n
+    do i = 1, size(self%assignment)
       if (self%assignment(i)%name == name) return
     end do
     i = 0
@@ -439,7 +398,7 @@ contains
     integer :: i
 
     text = ''
-    do i = 1, self%n
+    do i = 1, size(self%value)
       if (i > 1) text = text//', '
       if (self%value(i)%quoted) then
         text = text//quoted_text(self%value(i)%text)

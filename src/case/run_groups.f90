@@ -4,7 +4,7 @@ module run_groups_m
   use errors_m, only: to_text
   use case_types_m, only: run_t, grid_input_t, boundary_input_t, is_given
   use boundary_kinds_m, only: side_code, side_names, is_wall, gives_velocity
-  use allowed_values_m, only: any_number, positive, not_negative, at_least, between
+  use allowed_values_m, only: allowed_t, any_number, positive, not_negative, between
   use group_visitor_m, only: group_visitor_t
   use value_text_m, only: quoted_text
   implicit none
@@ -75,8 +75,8 @@ contains
     type(grid_input_t), intent(inout) :: grid
 
     call v%about('the tank and the cells it is cut into')
-    call v%integer('cells', grid%cells, at_least(1), 'how many cells in x, y, z', &
-      example='60, 20, 40', required=.true.)
+    call v%integer('cells', grid%cells, allowed_t(whole=.true., low=1.0_wp), &
+      'how many cells in x, y, z', example='60, 20, 40', required=.true.)
     call v%real('length', grid%length, between(shortest, 1.0_wp/shortest, 'm'), &
       'the length of the tank in x, y, z', example='0.3, 0.1, 0.2', required=.true.)
     call v%real('origin', grid%origin, any_number('m'), &

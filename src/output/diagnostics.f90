@@ -9,6 +9,8 @@ module diagnostics_m
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
+  use contacts_m, only: contact_report_t
+  use coupling_m, only: coupling_report_t
   use rigid_body_m, only: kinetic_energy, potential_energy
   use run_state_m, only: run_state_t
   implicit none
@@ -29,19 +31,14 @@ module diagnostics_m
     real(wp) :: cfl = 0.0_wp                  !! Courant number of liquid and blocks [-]
     real(wp) :: cfl_carried = 0.0_wp          !! largest share of itself that a cell gives [-]
     integer :: transport_parts = 0            !! in which the volumes of the step moved
-    real(wp) :: divergence_max = 0.0_wp       !! of the face velocity that the next step uses [1/s]
-    integer :: pressure_passes = 0
-    integer :: solver_iterations = 0          !! of all passes together
-    real(wp) :: contact_energy = 0.0_wp       !! elastic, at the end of the step [J]
+    logical :: transport_converged = .true.
+    type(contact_report_t) :: contact
+    type(coupling_report_t) :: coupling       !! its divergence is that which the next step uses
     real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m],
     logical :: overlap_known = .false.        !! measured for rows only
-    real(wp) :: contact_courant_max = 0.0_wp  !! C_s of eq. (6) [-]
-    integer :: substeps = 0
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
     integer :: inertia_clips = 0              !! limits of added inertia that cut it
     integer :: warnings = 0                   !! printed in this step
-    logical :: pressure_converged = .true., viscous_converged = .true., contacts_solved = .true.
-    logical :: transport_converged = .true.
     type(fluid_sums_t) :: fluid               !! at its end
     real(wp) :: energy_excess = 0.0_wp        !! over what was put in (`energy_m`) [-]
   end type step_report_t
@@ -70,9 +67,9 @@ contains
       quantity_t('time', 's', state%clock%t), &
       quantity_t('dt', 's', state%clock%dt), &
       quantity_t('cfl', '1', wet(report%cfl)), &
-      quantity_t('divergence_max', '1/s', wet(report%divergence_max)), &
-      quantity_t('pressure_passes', '1', wet(real(report%pressure_passes, wp))), &
-      quantity_t('solver_iterations', '1', wet(real(report%solver_iterations, wp))), &
+      quantity_t('divergence_max', '1/s', wet(report%coupling%pressure%divergence)), &
+      quantity_t('pressure_passes', '1', wet(real(report%coupling%pressure%passes, wp))), &
+      quantity_t('solver_iterations', '1', wet(real(report%coupling%pressure%iterations, wp))), &
       quantity_t('liquid_volume', 'm3', wet(report%fluid%liquid_volume)), &
       quantity_t('liquid_volume_drift', '1', wet(drift())), &
       quantity_t('volume_excess_max', '1', wet(report%fluid%excess_max)), &
@@ -80,11 +77,11 @@ contains
       quantity_t('kinetic_energy_bodies', 'J', kinetic), &
       quantity_t('potential_energy_fluid', 'J', wet(report%fluid%potential)), &
       quantity_t('potential_energy_bodies', 'J', potential), &
-      quantity_t('contact_energy', 'J', report%contact_energy), &
+      quantity_t('contact_energy', 'J', report%contact%energy), &
       quantity_t('energy_excess', '1', wet(report%energy_excess)), &
       quantity_t('max_overlap', 'm', report%max_overlap), &
-      quantity_t('contact_courant_max', '1', report%contact_courant_max), &
-      quantity_t('substeps', '1', real(report%substeps, wp)), &
+      quantity_t('contact_courant_max', '1', report%contact%courant_max), &
+      quantity_t('substeps', '1', real(report%contact%substeps, wp)), &
       quantity_t('sleeping', '1', real(count(state%blocks%asleep), wp)), &
       quantity_t('curvature_fallback', '1', wet(real(report%curvature_fallback, wp))), &
       quantity_t('transport_parts', '1', wet(real(report%transport_parts, wp))), &

@@ -18,8 +18,7 @@ module energy_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: energy_t, energy_parts_t, energy_init, begin_energy, store_energy, store_release, &
-            energy_excess
+  public :: energy_t, energy_parts_t, energy_init, put_in_energy, store_energy, energy_excess
 
   !> What is not known of an energy: that of the surface in a cell so high, and of the fall of the
   !! free blocks by so many radii.
@@ -79,26 +78,15 @@ contains
     end do
   end subroutine energy_init
 
-  !> What is there before the first step. What the liquid sets free when it comes to lie level
-  !! counts from the start.
-  subroutine begin_energy(parts, slope, self)
+  !> What is there before the first step, or after a release that has changed the energy: velocity
+  !! given, liquid lifted.
+  subroutine put_in_energy(parts, self)
     type(energy_parts_t), intent(in) :: parts
-    real(wp), intent(in) :: slope   !! potential energy of the fluid over that of a level one [J]
-    type(energy_t), intent(inout) :: self
-
-    self%parts = parts
-    self%put_in = sum_of(parts)
-    self%set_free = parts%kinetic + max(0.0_wp, slope)
-  end subroutine begin_energy
-
-  !> A release has changed the energy since the last step: velocity given, liquid lifted.
-  subroutine store_release(parts, self)
-    type(energy_parts_t), intent(in) :: parts   !! after it
     type(energy_t), intent(inout) :: self
 
     self%put_in = self%put_in + sum_of(parts) - sum_of(self%parts)
     self%parts = parts
-  end subroutine store_release
+  end subroutine put_in_energy
 
   !> After a step.
   subroutine store_energy(parts, self)

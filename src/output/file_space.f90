@@ -9,10 +9,10 @@
 !! if that fails nothing has been touched, and otherwise nothing that follows can fail for want of
 !! space. HDF5 cuts off most of what it did not need when it flushes.
 module file_space_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_null_char, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_null_char
   use kinds_m, only: i8
-  use c_library_m, only: c_close, c_dup, c_fsync, c_ftruncate, c_lseek, c_open, c_pwrite, c_unlink
-  use posix_file_m, only: is_file_at, system_reason
+  use c_library_m, only: c_close, c_dup, c_fsync, c_ftruncate, c_lseek, c_open, c_unlink
+  use posix_file_m, only: is_file_at, all_written, system_reason
   implicit none
   private
   public :: held_file_t, bytes_for_chunks
@@ -62,22 +62,15 @@ contains
     integer(i8), intent(in) :: wanted                   !! [bytes]
     character(:), allocatable, intent(out) :: message   !! reason of an error, else empty
     integer(i8), parameter :: piece = 2**20
-    character(:), allocatable :: zeros
-    integer(i8) :: before, there, n
+    integer(i8) :: before, there
 
     message = ''
     before = self%length()
-    zeros = repeat(char(0), int(min(max(wanted - before, 0_i8), piece)))
-    there = before
-    do while (there < wanted)
-      n = int(c_pwrite(self%fd, zeros, int(min(wanted - there, piece), c_size_t), &
-                       int(there, c_long)), i8)
-      if (n <= 0) then
-        message = 'cannot write: '//system_reason()
-        call self%shorten(before)
-        return
-      end if
-      there = there + n
+    do there = before, wanted - 1, piece
+      if (all_written(self%fd, there, repeat(char(0), int(min(wanted - there, piece))))) cycle
+      message = 'cannot write: '//system_reason()
+      call self%shorten(before)
+      return
     end do
   end subroutine lengthen
 

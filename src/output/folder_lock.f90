@@ -17,7 +17,7 @@ module folder_lock_m
     c_unlinkat, text_of_letters
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_pause
-  use posix_file_m, only: posix_file_t, system_reason, lock_refused, lock_unknown
+  use posix_file_m, only: posix_file_t, is_file_at, system_reason, lock_refused, lock_unknown
   implicit none
   private
   public :: folder_lock_t, lock_name, stop_name, look_at_folder
@@ -105,7 +105,7 @@ contains
     class(folder_lock_t), intent(inout) :: self
     logical :: yes
 
-    yes = self%file%is_at(self%folder//lock_name)
+    yes = is_file_at(self%file%number, self%folder//lock_name)
     if (yes) self%taken = text_of(self%folder) /= who_we_are()
     if (.not. yes) self%taken = self%file%content() /= who_we_are()
     yes = yes .and. self%number >= 0 .and. .not. self%taken

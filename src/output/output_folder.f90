@@ -6,8 +6,9 @@
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use c_library_m, only: c_access, c_closedir, c_mkdir, c_opendir, c_readdir, c_realpath, &
+  use c_library_m, only: c_closedir, c_mkdir, c_opendir, c_readdir, c_realpath, &
     c_rename, max_path, text_of_letters
+  use kinds_m, only: i8
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
   use posix_file_m, only: posix_file_t
@@ -220,7 +221,7 @@ contains
     character(*), intent(in) :: path
     logical :: yes
 
-    yes = c_access(path//c_null_char, 0_c_int) == 0
+    inquire (file=path, exist=yes)
   end function exists
 
   !> Does a folder hold nothing but itself, its parent and a lock? One that cannot be read counts as
@@ -249,20 +250,22 @@ contains
     type(folder_lock_t), intent(in) :: lock                !! of the folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
-    integer, parameter :: piece = 2**20
     character(:), allocatable :: bytes
     type(posix_file_t) :: source, target
     logical :: made
+    integer(i8) :: place
     integer :: n
 
-    allocate (character(piece) :: bytes)
+    bytes = repeat(' ', 2**20)
     call source%open(from//'/'//name, 'r')
     call target%open(lock%folder//'/'//name, 'wx')
     made = target%info == 0
+    place = 0
     do
-      call source%read(bytes, n)
-      if (n == 0 .or. target%info /= 0) exit
-      call target%write(bytes(:n))
+      call source%read(place, bytes, n)
+      if (n <= 0 .or. target%info /= 0) exit
+      call target%write(place, bytes(:n))
+      place = place + n
     end do
     call source%close()
     call target%close()

@@ -14,7 +14,7 @@ module memory_plan_m
   use machine_memory_m, only: available_memory, memory_limit
   implicit none
   private
-  public :: planned_memory, require_memory, require_memory_to_start, size_text
+  public :: planned_memory, require_memory, size_text
 
   integer(i8), parameter :: bytes_per_cell = 850       !! all arrays: fields, solids, solvers [B]
   integer(i8), parameter :: bytes_of_c_ismac = 470     !! more for each cell [B]
@@ -48,50 +48,33 @@ contains
     end do
   end function planned_memory
 
-  !> End with code 4 if there is not even memory to read a case.
-  subroutine require_memory_to_start()
-    call require(bytes_at_rest, 'the program takes '//size_text(real(bytes_at_rest, wp)) &
-      //' of memory')
-  end subroutine require_memory_to_start
-
   !> End with code 4 if the share of this process, or of another one, in the memory that the run
   !! will take is above its limit; warn if the run takes more than the machine has left. Call it
-  !! before anything is written.
+  !! before anything is written, and first without a case: is there memory to read one?
   subroutine require_memory(case, shapes)
-    type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
-    character(:), allocatable :: asked
+    type(case_t), intent(in), optional :: case
+    type(shape_t), intent(in), optional :: shapes(:)
+    character(:), allocatable :: asked, left
     integer(i8) :: planned, available
-
-    planned = planned_memory(case, shapes)
-    asked = 'the run takes about '//size_text(real(planned, wp))//' of memory'
-    if (nproc() > 1) asked = asked//' in '//to_text(nproc())//' processes'
-    call require(planned/nproc(), asked)
-    available = available_memory()
-    if (planned <= available .or. available == 0 .or. .not. is_root()) return
-    write (error_unit, '(a)') 'mics: warning: '//asked//what_is_left()//'; it may be killed'
-  end subroutine require_memory
-
-  !> End with code 4 if the limit of this process or of another one is below so many bytes.
-  subroutine require(bytes, asked)
-    integer(i8), intent(in) :: bytes
-    character(*), intent(in) :: asked
     real(wp) :: beyond(1)
 
-    beyond = merge(1.0_wp, 0.0_wp, bytes > memory_limit())
-    call global_max(beyond)
-    if (beyond(1) > 0.0_wp) call fatal(exit_files, asked//what_is_left() &
-      //'; the machine has less, or a limit is lower (ulimit -v)')
-  end subroutine require
-
-  function what_is_left() result(text)
-    character(:), allocatable :: text
-    integer(i8) :: available
-
+    planned = bytes_at_rest
+    asked = 'the program takes '//size_text(real(planned, wp))//' of memory'
+    if (present(case)) then
+      planned = planned_memory(case, shapes)
+      asked = 'the run takes about '//size_text(real(planned, wp))//' of memory'
+      if (nproc() > 1) asked = asked//' in '//to_text(nproc())//' processes'
+    end if
     available = available_memory()
-    text = ''
-    if (available > 0) text = ', '//size_text(real(available, wp))//' are left'
-  end function what_is_left
+    left = ''
+    if (available > 0) left = ', '//size_text(real(available, wp))//' are left'
+    beyond = merge(1.0_wp, 0.0_wp, planned/merge(nproc(), 1, present(case)) > memory_limit())
+    call global_max(beyond)
+    if (beyond(1) > 0.0_wp) call fatal(exit_files, asked//left &
+      //'; the machine has less, or a limit is lower (ulimit -v)')
+    if (planned <= available .or. available == 0 .or. .not. (present(case) .and. is_root())) return
+    write (error_unit, '(a)') 'mics: warning: '//asked//left//'; it may be killed'
+  end subroutine require_memory
 
   !> An amount of memory or disk.
   pure function size_text(bytes) result(text)

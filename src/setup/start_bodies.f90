@@ -21,16 +21,6 @@ module start_bodies_m
   real(wp), parameter :: same_time = 1.0e-9_wp   !! times this close are one [s]
   real(wp), parameter :: same_mass = 1.0e-9_wp   !! masses this close are one [-]
 
-  !> The blocks of another run at a row.
-  type :: left_t
-    integer :: n = 0
-    real(wp) :: time = 0.0_wp                      !! [s]
-    character(name_length), allocatable :: shape(:)
-    logical, allocatable :: free(:), released(:)
-    real(wp), allocatable :: mass(:)               !! [kg]
-    real(wp), allocatable :: x(:, :), q(:, :), v(:, :), omega(:, :)
-  end type left_t
-
 contains
 
   !> Read the file of `&start` and see which blocks begin there; `case%begun` holds it.
@@ -38,14 +28,17 @@ contains
     type(case_t), intent(inout) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(problems_t), intent(inout) :: problems
-    type(left_t) :: left
+    type(begun_t) :: left   ! all blocks of the other run
+    logical, allocatable :: free(:), taken(:)
+    real(wp), allocatable :: mass(:)   ! [kg]
     logical :: faultless
 
     if (len_trim(case%start%file) == 0 .or. case%run%physics == 'fluid') return
     faultless = problems%n == 0
-    call read_left(case, left, problems)
+    allocate (free(0), taken(0), mass(0))
+    call read_left(case, left, free, taken, mass, problems)
     if (.not. faultless .or. problems%n > 0) return   ! what is wrong may be what would match
-    call match(case, shapes, left, problems)
+    call match(case, shapes, left, free, taken, mass, problems)
   end subroutine read_start
 
   !> Report a problem with the group.
@@ -59,9 +52,11 @@ contains
   end subroutine report
 
   !> The blocks in the file at the time asked for.
-  subroutine read_left(case, left, problems)
+  subroutine read_left(case, left, free, taken, mass, problems)
     type(case_t), intent(in) :: case
-    type(left_t), intent(inout) :: left
+    type(begun_t), intent(inout) :: left
+    logical, allocatable, intent(inout) :: free(:), taken(:)   !! not fixed; and released by then
+    real(wp), allocatable, intent(inout) :: mass(:)            !! [kg]
     type(problems_t), intent(inout) :: problems
     type(h5_file_t) :: file
     real(wp), allocatable :: time(:), release_time(:)
@@ -84,18 +79,19 @@ contains
     call file%shape_of('/bodies/mass', extent)
     if (file%info == 0) left%n = product(extent)
     associate (n => left%n)
-      allocate (left%shape(n), left%free(n), left%released(n), left%mass(n), release_time(n))
+      allocate (left%shape(n), release_time(n))
+      mass = spread(0.0_wp, 1, n)
       allocate (left%x(3, n), left%q(4, n), left%v(3, n), left%omega(3, n), fixed(n))
       call file%read('/bodies/shape', left%shape)
-      call file%read('/bodies/mass', left%mass)
+      call file%read('/bodies/mass', mass)
       call file%read('/bodies/fixed', fixed)
       call file%read('/bodies/release_time', release_time)
       if (file%info == 0) then
         row = row_of(case, time, problems)
         if (row > 0) then
           left%time = time(row)
-          left%free = fixed == 0
-          left%released = release_time <= left%time + same_time
+          free = fixed == 0
+          taken = free .and. release_time <= left%time + same_time
           call read_row('position', 3, left%x)
           call read_row('quaternion', 4, left%q)
           call read_row('velocity', 3, left%v)
@@ -140,22 +136,22 @@ contains
   end function row_of
 
   !> Give the blocks of the other run to those of the case, shape by shape.
-  subroutine match(case, shapes, left, problems)
+  subroutine match(case, shapes, left, free, taken, mass, problems)
     type(case_t), intent(inout) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(left_t), intent(in) :: left
+    type(begun_t), intent(in) :: left
+    logical, intent(in) :: free(:), taken(:)
+    real(wp), intent(in) :: mass(:)   !! [kg]
     type(problems_t), intent(inout) :: problems
     type(blocks_t) :: blocks
     integer :: here(left%n)      ! the block of the case that each becomes; 0: none
-    logical :: taken(left%n)
     integer :: form(left%n), number(left%n)   ! of each there: shape, among the free ones of it
     integer, allocatable :: number_here(:)
     integer :: i, k, s, n_there, n_here, last
 
     call blocks_init(case, shapes, blocks)
-    taken = left%free .and. left%released
     form = [(findloc(shapes%name == left%shape(i), .true., 1), i=1, left%n)]
-    number = [(count(left%free(:i) .and. form(:i) == form(i)), i=1, left%n)]
+    number = [(count(free(:i) .and. form(:i) == form(i)), i=1, left%n)]
     allocate (number_here(blocks%n))
     do i = 1, blocks%n
       number_here(i) = count(.not. blocks%fixed(:i) .and. blocks%shape(:i) == blocks%shape(i))
@@ -171,9 +167,9 @@ contains
           //quoted_text(trim(left%shape(i)))//', which no &shape here has', problems)
         cycle
       end if
-      if (abs(left%mass(i) - shapes(s)%density*shapes(s)%volume) > same_mass*left%mass(i)) then
+      if (abs(mass(i) - shapes(s)%density*shapes(s)%volume) > same_mass*mass(i)) then
         call report(case, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
-          //to_text(left%mass(i))//' kg there and '//to_text(shapes(s)%density*shapes(s)%volume) &
+          //to_text(mass(i))//' kg there and '//to_text(shapes(s)%density*shapes(s)%volume) &
           //' kg here; shapes must be the same', problems)
         cycle
       end if
@@ -256,7 +252,7 @@ contains
   !> Blocks of the other run that become bodies of the case.
   subroutine bring_along(case, left, along)
     type(case_t), intent(inout) :: case
-    type(left_t), intent(in) :: left
+    type(begun_t), intent(in) :: left
     logical, intent(in) :: along(:)
     type(body_input_t), allocatable :: body(:)
     integer :: k, n

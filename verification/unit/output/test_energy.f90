@@ -2,8 +2,8 @@
 module test_energy_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use kinds_m, only: wp
-  use energy_m, only: energy_t, energy_parts_t, energy_init, begin_energy, store_energy, &
-    store_release, energy_excess
+  use energy_m, only: energy_t, energy_parts_t, energy_init, put_in_energy, store_energy, &
+    energy_excess
   use case_text_m, only: sides
   use one_body_m, only: one_body_t, place
   use check_m, only: check
@@ -35,7 +35,7 @@ contains
     book%known = .true.
     z = 2.0_wp
     v = 0.0_wp
-    call begin_energy(energy_parts_t(0.0_wp, 0.0_wp, m*g*z), 0.0_wp, book)
+    call put_in_energy(energy_parts_t(0.0_wp, 0.0_wp, m*g*z), book)
     do step = 1, 50
       z = z + dt*v
       v = v - dt*g
@@ -55,9 +55,9 @@ contains
     type(energy_t) :: book
 
     book%known = .true.
-    call begin_energy(energy_parts_t(1.0_wp, 0.0_wp, 10.0_wp), 0.0_wp, book)
+    call put_in_energy(energy_parts_t(1.0_wp, 0.0_wp, 10.0_wp), book)
     call store_energy(energy_parts_t(0.5_wp, 0.25_wp, 10.0_wp), book)
-    call store_release(energy_parts_t(3.5_wp, 0.25_wp, 11.0_wp), book)
+    call put_in_energy(energy_parts_t(3.5_wp, 0.25_wp, 11.0_wp), book)
     call check('put in', book%put_in, 15.0_wp, tolerance)
     call store_energy(energy_parts_t(2.0_wp, 0.0_wp, 11.0_wp), book)
     call check('a loss is no excess', book%excess, -0.25_wp, tolerance)
@@ -87,7 +87,7 @@ contains
     call place(tank//'&fluid gas_density=1000 liquid_density=1000/ &body shape="b" fixed=T ' &
                //'position=3*.4/', box)
     call energy_init(box%case, box%grid, box%blocks, book)
-    call begin_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), 0.0_wp, book)
+    call put_in_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), book)
     call store_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), book)
     call store_energy(energy_parts_t(0.0_wp, 0.0_wp, weight*(1.0_wp + 1.0e-15_wp)), book)
     call check('round-off is no excess', energy_excess(book), 0.0_wp, 1.0e-12_wp)
