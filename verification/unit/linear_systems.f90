@@ -104,10 +104,9 @@ contains
   end subroutine set_tank
 
   !> Density of a cell under a wavy surface, the level of which fits the height of the box.
-  pure function density(grid, c) result(rho)
+  pure real(wp) function density(grid, c) result(rho)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: c(3)
-    real(wp) :: rho
     real(wp) :: x(3), level
 
     x = grid%centre(wrapped(grid, c), [1, 2, 3])
@@ -117,11 +116,10 @@ contains
   end function density
 
   !> Share of the sample points of a face that lie outside all blocks.
-  pure function open_share(grid, turn, x, d) result(w)
+  pure real(wp) function open_share(grid, turn, x, d) result(w)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: turn(3, 3, n_blocks), x(3)
     integer, intent(in) :: d
-    real(wp) :: w
     real(wp) :: point(3)
     integer :: p, q, e(2), n_open
 
@@ -275,8 +273,7 @@ contains
   !> y = A x.
   subroutine apply_faces(self, x, y)
     class(face_operator_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: x(:, :, :)
-    real(wp), intent(inout), contiguous :: y(:, :, :)
+    real(wp), intent(inout), contiguous :: x(:, :, :), y(:, :, :)
 
     call halo_exchange(x, 1)
     call seven_points(self%lo, self%hi, self%cf, x, y)

@@ -85,9 +85,8 @@ contains
   end function wall_at
 
   !> Velocity at the distance y from a wall in a layer of thickness delta, over that far from it.
-  elemental function layer(y, delta) result(v)
+  elemental real(wp) function layer(y, delta) result(v)
     real(wp), intent(in) :: y, delta
-    real(wp) :: v
 
     v = y/max(y + delta, tiny(y))
   end function layer

@@ -11,8 +11,7 @@ contains
   !> Vector v turned by the unit quaternion q, from body to space axes.
   pure function rotate(q, v) result(r)
     real(wp), intent(in) :: q(4), v(3)
-    real(wp) :: r(3)
-    real(wp) :: t(3)
+    real(wp) :: r(3), t(3)
 
     t = 2*cross(q(2:4), v)
     r = v + q(1)*t + cross(q(2:4), t)

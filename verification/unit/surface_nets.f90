@@ -47,8 +47,7 @@ contains
         end do
       end associate
     end do
-    call check(name//': two polygons at each edge', all(pairs <= 1) &
-               .and. all(pairs == transpose(pairs)))
+    call check(name//': two at each edge', all(pairs <= 1) .and. all(pairs == transpose(pairs)))
     call check(name//': flat', flat)
     call check(name//': bent at every corner', bent)
     if (present(euler)) call check(name//': Euler''s number', count(any(pairs > 0, 2)) &

@@ -77,9 +77,8 @@ contains
   end function meeting_at
 
   !> Signed distance of a point from the cube, in its axes [m].
-  pure function distance_from_cube(p) result(distance)
+  pure real(wp) function distance_from_cube(p) result(distance)
     real(wp), intent(in) :: p(3)   !! [m]
-    real(wp) :: distance
 
     distance = maxval(abs(p)) - 0.5_wp
     if (distance > 0.0_wp) distance = norm2(max(0.0_wp, abs(p) - 0.5_wp))

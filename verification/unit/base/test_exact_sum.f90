@@ -60,7 +60,7 @@ contains
     integer :: i, different
 
     s = exact_sum(a)
-    call check('equals a quadruple precision sum', s, real(sum(real(a, real128)), wp), &
+    call check('as in quadruple precision', s, real(sum(real(a, real128)), wp), &
       1.0e-15_wp*sum(abs(a)))
     different = 0
     do i = 1, 40

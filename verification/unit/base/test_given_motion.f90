@@ -56,8 +56,7 @@ contains
     do i = 1, 5
       call pose_at(motion, time(i), at, turned, v, omega)
       call check('through the place of a row', at, x(:, i), 1.0e-15_wp)
-      call check('and its attitude', abs(dot_product(turned, q(:, i)/norm2(q(:, i)))), 1.0_wp, &
-        1.0e-15_wp)
+      call check('attitude', abs(dot_product(turned, q(:, i)/norm2(q(:, i)))), 1.0_wp, 1.0e-15_wp)
     end do
     call check('starts and ends at rest', [v, omega], spread(0.0_wp, 1, 6))
     call pose_at(motion, 0.5_wp, at, turned, v, omega)
@@ -107,8 +106,7 @@ contains
         1.0e-15_wp)
       call check('spin', omega, 1.2_wp*3.0_wp*s*(1.0_wp - s)*axis, 1.0e-15_wp)
     end do
-    call check('fastest in the middle', fastest_between(motion, 0.1_wp, 0.2_wp), [0.0_wp, 0.9_wp], &
-      1.0e-15_wp)
+    call check('fastest', fastest_between(motion, 0.1_wp, 0.2_wp), [0.0_wp, 0.9_wp], 1.0e-15_wp)
     call check('none later', maxval(fastest_between(motion, 2.0_wp, 3.0_wp)), 0.0_wp)
     call check('none before', maxval(fastest_between(motion, -2.0_wp, -1.0_wp)), 0.0_wp)
 

@@ -6,6 +6,7 @@ module test_parallel_m
   use exact_accumulator_m, only: accumulator_value
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_add, exact_totals, &
     no_terms, accumulator_size
+  use random_counter_m, only: uniform
   use parallel_m, only: decompose, halo_exchange, gather_all, &
     global_max, global_sum, broadcast, nproc, my_rank, is_root, set_threads, get_threads
   implicit none
@@ -30,7 +31,8 @@ contains
     call test_reductions()
     call test_sums([20, 12, 21])
     call test_broadcast()
-    call test_threads()
+    call set_threads(2)
+    call check('threads', get_threads(), 2)
   end subroutine test_parallel
 
   !> The blocks are disjoint, cover the domain and are not thinner than the scheme needs.
@@ -54,17 +56,10 @@ contains
     call check('upper sides known', all(hi == n .eqv. at_side(2, :)))
     call check('cuts leave 4 cells', all(hi - lo + 1 >= 4 .or. (at_side(1, :) .and. at_side(2, :))))
     allocate (owned(n(1), n(2), n(3)), source=0.0_wp)
-    call gather_all(spread_rank(lo, hi), lo, hi, owned)
+    call gather_all(spread(spread(spread(my_rank() + 1.0_wp, 1, hi(1) - lo(1) + 1), 2, &
+      hi(2) - lo(2) + 1), 3, hi(3) - lo(3) + 1), lo, hi, owned)
     call check('no cell without owner', all(owned > 0.0_wp))
   end subroutine test_blocks
-
-  function spread_rank(lo, hi) result(block_of_ranks)
-    integer, intent(in) :: lo(3), hi(3)
-    real(wp), allocatable :: block_of_ranks(:, :, :)
-
-    allocate (block_of_ranks(hi(1) - lo(1) + 1, hi(2) - lo(2) + 1, hi(3) - lo(3) + 1))
-    block_of_ranks = real(my_rank() + 1, wp)
-  end function spread_rank
 
   !> A number that tells the cell; periodic directions wrap, cells beyond other sides are -1.
   pure real(wp) function label(i, n, periodic)
@@ -174,7 +169,7 @@ contains
   !> Sums over blocks equal the sum of one process over everything, bit for bit.
   subroutine test_sums(n)
     integer, intent(in) :: n(3)
-    integer :: lo(3), hi(3), a(3), b(3)
+    integer :: lo(3), hi(3), a(3), b(3), i
     logical :: at_side(2, 3)
     real(wp), allocatable :: x(:, :, :), mine(:)
     real(wp) :: s, pair(2), total(1)
@@ -182,9 +177,7 @@ contains
 
     call decompose(n, all_open, lo, hi, at_side)
     allocate (x(1 - w:n(1) + w, 1 - w:n(2) + w, 1 - w:n(3) + w))
-    call random_seed_fixed()
-    call random_number(x)
-    x = (x - 0.5_wp)**9
+    x = reshape([((uniform(1, 1, i) - 0.5_wp)**9, i=1, size(x))], shape(x))   ! on every process
     a = lo - w
     b = hi + w
     s = whole_sum([x(1:n(1), 1:n(2), 1:n(3))**2])
@@ -202,18 +195,9 @@ contains
     call check('terms of different size on different processes', total(1), 2.0_wp**(-30))
   end subroutine test_sums
 
-  !> The same numbers on every process.
-  subroutine random_seed_fixed()
-    integer :: length
-
-    call random_seed(size=length)
-    call random_seed(put=spread(20240607, 1, length))
-  end subroutine random_seed_fixed
-
   !> Order-free sum of this process alone.
-  function whole_sum(x) result(s)
+  real(wp) function whole_sum(x) result(s)
     real(wp), intent(in) :: x(:)
-    real(wp) :: s
     integer(i8) :: accumulator(accumulator_size)
 
     accumulator = no_terms
@@ -240,10 +224,5 @@ contains
     call check('text', text == '&run t_end = 1 /'//new_line('a')//'two lines' .and. len(text) == 26)
     call check('integer and logical', i == 5 .and. yes)
   end subroutine test_broadcast
-
-  subroutine test_threads()
-    call set_threads(2)
-    call check('threads', get_threads(), 2)
-  end subroutine test_threads
 
 end module test_parallel_m

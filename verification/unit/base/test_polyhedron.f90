@@ -82,8 +82,7 @@ contains
     c(1, 2) = 1.0_wp
     c(2, 3) = 1.0_wp
     c(3, 4) = 1.0_wp
-    call check('face on the plane, body above', &
-      volume_of_part(c, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp), 0.0_wp)
+    call check('body above the plane', volume_of_part(c, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp), 0.0_wp)
     call check('face on the plane, body below', &
       volume_of_part(c, [0.0_wp, 0.0_wp, -1.0_wp], 0.0_wp), 1.0_wp/6.0_wp)
     call check('half by a plane through an edge', &
@@ -116,17 +115,15 @@ contains
   end subroutine plane_through_corners
 
   !> Volume of the part of a tetrahedron with n.x <= d.
-  function volume_of_part(corner, n, d) result(volume)
+  real(wp) function volume_of_part(corner, n, d) result(volume)
     real(wp), intent(in) :: corner(3, 4), n(3), d
-    real(wp) :: volume
     real(wp) :: moment(3)
 
     call tet_moments_below(corner, n, d, volume, moment)
   end function volume_of_part
 
   !> Unit box below x + y + z + x_d <= 2 for d = 1..3, as the tetrahedra of its symmetric sixths.
-  function reference_cut() result(volume)
-    real(wp) :: volume
+  real(wp) function reference_cut() result(volume)
     real(wp) :: c(3, 4)
 
     ! In the sixth x >= y >= z only d = 1 matters: 2x + y + z <= 2 there.

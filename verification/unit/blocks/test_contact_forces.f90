@@ -137,7 +137,7 @@ contains
       energy(i) = elastic_energy(detected, displacements, rest)
       if (i == 0) call check('force k d^1.5', loads%force(3, 1), k_n*d**1.5_wp, 1.0e-12_wp*k_n)
     end do
-    call check('slope of the energy', (energy(1) - energy(-1))/(2*step), k_n*d**1.5_wp, &
+    call check('its slope', (energy(1) - energy(-1))/(2*step), k_n*d**1.5_wp, &
       1.0e-6_wp*k_n*d**1.5_wp)
     do i = -1, 1
       displacements%xi(:, 1) = (stretch + i*step)*x
@@ -174,7 +174,7 @@ contains
     call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
     call check('slips', loads%force([1, 3], 3), push*[mu, 1.0_wp], 1.0e-12_wp*push)
     call check('slips on the floor', loads%force(1, 2), wall_mu*push, 1.0e-12_wp*push)
-    call check('the displacements kept', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], &
+    call check('what is kept', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], &
       1.0e-12_wp*push/k_t)
   end subroutine check_friction
 
@@ -195,8 +195,7 @@ contains
     report = contact_report_t()
     call sum_forces(dt, detected, displacements, loads, report)
     force = loads%force(3, 2)
-    call check('damping in the middle', force, k_n*d + eta*(closing - 0.5_wp*dt*force/mass(2)), &
-      1.0e-12_wp*force)
+    call check('damping', force, k_n*d + eta*(closing - 0.5_wp*dt*force/mass(2)), 1.0e-12_wp*force)
     call check('Courant number', report%courant_max, closing*dt/0.5_wp, 1.0e-15_wp)
     call check('overlap', report%overlap_max, d)
     detected%counterparts%v(3, 2) = 2*k_n*d/eta
@@ -220,8 +219,7 @@ contains
       call detect_again([point], detected, displacements)   ! it is not new any more
       detected%counterparts%v(3, 2) = -closing
       call sum_forces(dt, detected, displacements, loads, report)
-      call check('a strong dashpot stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), &
-        1.0e-12_wp)
+      call check('it stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), 1.0e-12_wp)
     end do
   end subroutine check_strong_damping
 
@@ -273,8 +271,7 @@ contains
     call check('one is new', all(detected%groups%new(:3) .eqv. [.true., .false., .false.]))
     call check('and begins at nothing', displacements%xi(:, 1), 0*x)
     call check('one stays', displacements%xi(:, 2), 3*dt*x, 1.0e-15_wp)
-    call check('one turns with its plane', displacements%xi(:, 3), dt*[0.8_wp, 0.0_wp, -0.6_wp], &
-      1.0e-15_wp)
+    call check('one turns', displacements%xi(:, 3), dt*[0.8_wp, 0.0_wp, -0.6_wp], 1.0e-15_wp)
     call detect_again(point(2:2), detected, displacements)
     call detect_again(point, detected, displacements)
     call check('what has parted is forgotten', displacements%xi(:, 3), 0*x)

@@ -39,8 +39,7 @@ contains
     call check('critical damping', restitution_of(1.0_wp), exp(-2.0_wp), 1.0e-15_wp)
     call check('smooth at zeta = 1', restitution_of([1.0_wp - 1.0e-6_wp, 1.0_wp + 1.0e-6_wp]) &
       - exp(-2.0_wp)*(1.0_wp - [-1, 1]*4.0e-6_wp/3), 0.0_wp, 1.0e-11_wp)
-    call check('the inverse is one', &
-      restitution_of(damping_ratio_of(asked)) - asked, 0.0_wp, 1.0e-13_wp)
+    call check('inverse', restitution_of(damping_ratio_of(asked)) - asked, 0.0_wp, 1.0e-13_wp)
     call check('e = 0.1 is overdamped', damping_ratio_of(0.1_wp), 1.243_wp, 1.0e-3_wp)
     call check('no damping at e = 1', damping_ratio_of(1.0_wp) <= 0.0_wp)
   end subroutine check_closed_form
@@ -125,15 +124,13 @@ contains
     input%restitution = 0.3_wp
     call choose_law(input, law)
     k = law%normal_constant(0.25_wp, load_t(), 1.0_wp)
-    call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, &
-      1.0e-15_wp)
+    call check('damped', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
     call law%damping(1.0_wp, k, 1.0_wp, 4.0_wp, eta, decay)
     call check('damping of that ratio', eta, 2*law%damping_ratio*sqrt(k*0.25_wp), 1.0e-12_wp*eta)
     call check('its decay', decay, 0.5_wp*eta/0.25_wp, 1.0e-12_wp*decay)
     call law%damping(0.3_wp, k, 1.0_wp, 4.0_wp, eta, decay)
     call check('a share of it', eta, 0.6_wp*law%damping_ratio*sqrt(k*0.25_wp), 1.0e-12_wp*eta)
-    call check('as much across as stiff', law%tangential_damping(1.0_wp, 7.0_wp, 2*k/7, k), &
-      2.0_wp, 1.0e-14_wp)
+    call check('across', law%tangential_damping(1.0_wp, 7.0_wp, 2*k/7, k), 2.0_wp, 1.0e-14_wp)
     call check('tangential stiffness', law%tangential_constant(k, 1.0_wp), 2*k/7, 1.0e-9_wp*k)
     input%law = 'constants'
     input%eta_n = 3.0_wp
@@ -162,8 +159,7 @@ contains
       call choose_law(input, law)
       call check('spring of critical damping', law%normal_constant(mass, load_t(), 1.0_wp), &
         mass*(2.0_wp/time)**2, 1.0e-9_wp*mass/time**2)
-      call check('dashpot of the restitution', restitution_of(law%damping_ratio), &
-        max(e(m), 0.01_wp), 1.0e-12_wp)
+      call check('dashpot', restitution_of(law%damping_ratio), max(e(m), 0.01_wp), 1.0e-12_wp)
     end do
     input%restitution = 0.2_wp
     call choose_law(input, law)
@@ -192,8 +188,7 @@ contains
       1.0e-6_wp), 0.5_wp*heavy*k, 1.0e-9_wp*heavy*k)
     input%law = 'constants'
     call choose_law(input, law)
-    call check('constants stay', &
-      law%normal_constant(mass, load_t(heavy, heavy*g), 1.0e-6_wp), input%k_n)
+    call check('constants', law%normal_constant(mass, load_t(heavy, heavy*g), 1.0e-6_wp), input%k_n)
   end subroutine check_load
 
   !> Equations (1) and (2) for one contact point.

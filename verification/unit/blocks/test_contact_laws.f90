@@ -36,8 +36,7 @@ contains
       call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
       call check('the spring holds the force', elastic%force, force(i), 1.0e-9_wp*force(i))
     end do
-    call check('as a linear spring where shallow', depth_at_rest(law, k, hard, 1.0_wp), 1.0e-4_wp, &
-      1.0e-7_wp)
+    call check('linear where shallow', depth_at_rest(law, k, hard, 1.0_wp), 1.0e-4_wp, 1.0e-7_wp)
     input%law = 'constants'
     input%gamma_n = 1.5_wp
     call choose_law(input, law)
@@ -56,14 +55,13 @@ contains
       //'kind="cube" size=.02/ &shape name="large" kind="cube" size=.3/ &body shape="small" ' &
       //'position=3*.5/ &body shape="large" position=3*1/ &body shape="small" position=3*1.5/', &
         world)
-    call check('a cube hardens at a twelfth of its edge', hard_depth(world%shapes(1)), size(1)/12, &
+    call check('a twelfth of the edge of a cube', hard_depth(world%shapes(1)), size(1)/12, &
       1.0e-15_wp)
     call counterparts_init(world%blocks, counterparts)
     call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
     load = load_of(world%blocks%mass(2), g)
     call check('the heaviest', counterparts%load%mass, world%blocks%mass(2))
-    call check('its weight', counterparts%load%weight, world%blocks%mass(2)*g, &
-      1.0e-12_wp*load%weight)
+    call check('weight', counterparts%load%weight, world%blocks%mass(2)*g, 1.0e-12_wp*load%weight)
     call check('may give way', counterparts%rest_overlap(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
     world%blocks%fixed(2) = .true.
     call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)

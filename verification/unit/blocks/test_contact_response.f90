@@ -183,8 +183,7 @@ contains
       call push_apart(point, gamma, force, wrench)
       power = -dot_product(wrench%force, motion%v) + dot_product(wrench%torque_a, motion%omega_a) &
         + dot_product(wrench%torque_b, motion%omega_b)
-      call check('power of a contact point', power, force*opening_speed(point, gamma, motion), &
-        1.0e-13_wp)
+      call check('power of a point', power, force*opening_speed(point, gamma, motion), 1.0e-13_wp)
     end do
   end subroutine check_power
 

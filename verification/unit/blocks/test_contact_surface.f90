@@ -62,17 +62,17 @@ contains
   !! corners that stand.
   subroutine check_rest_heights()
     type(touching_t) :: world
-    real(wp) :: height(3), q(4, 3)
-    integer :: corners(3), pose, shape
+    real(wp), parameter :: sunk = 1.0e-5_wp, &
+      height(3) = d*[1.5_wp, sqrt(2.0_wp), 2.5_wp/sqrt(3.0_wp)]
+    integer, parameter :: corners(3) = [4, 4, 3]
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'fine']
-    real(wp), parameter :: sunk = 1.0e-5_wp
+    real(wp) :: q(4, 3)
+    integer :: pose, shape
 
-    height = [1.5_wp, sqrt(2.0_wp), 2.5_wp/sqrt(3.0_wp)]*d
-    corners = [4, 4, 3]
     q(:, 1) = upright
     q(:, 2) = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.25_wp*pi)
     q(:, 3) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
-                                                      atan(sqrt(0.5_wp))), q(:, 2))
+      atan(sqrt(0.5_wp))), q(:, 2))
     do shape = 1, 2
       do pose = 1, 3
         call new_world(world, names(shape:shape))
@@ -91,24 +91,21 @@ contains
   !> The corner of a cube in the face of another, from both sides.
   subroutine check_corner_in_face()
     type(touching_t) :: world
-    real(wp) :: depth
+    real(wp), parameter :: depth = 2.0e-4_wp, at(3) = [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth]
     integer :: upper
 
-    depth = 2.0e-4_wp
     do upper = 1, 2
       call new_world(world, ['cube', 'cube'])
       world%blocks%q(:, upper) = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], atan(sqrt(2.0_wp)))
-      world%blocks%x(1:2, upper) = [0.503_wp, 0.498_wp]
-      world%blocks%x(3, upper) = 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth
+      world%blocks%x(:, upper) = [at(:2), 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth]
       call find(world)
       call check('one corner in a face', world%points%n, 1)
-      call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
-      call check('normal from a to b', world%points%item(1)%normal(3), &
-                 merge(1.0_wp, -1.0_wp, upper == 1), 1.0e-14_wp)
-      call check('its arm', world%points%item(1)%arm_a + world%blocks%x(:, 2), &
-                 [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
-      call check('both arms meet', world%points%item(1)%arm_b + world%blocks%x(:, 1), &
-                 [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
+      associate (point => world%points%item(1))
+        call check('its depth', point%depth, depth, 1.0e-15_wp)
+        call check('normal from a to b', point%normal(3), 3.0_wp - 2*upper, 1.0e-14_wp)
+        call check('its arm', point%arm_a + world%blocks%x(:, 2), at, 1.0e-15_wp)
+        call check('both arms meet', point%arm_b + world%blocks%x(:, 1), at, 1.0e-15_wp)
+      end associate
     end do
   end subroutine check_corner_in_face
 
@@ -140,23 +137,22 @@ contains
     integer :: t, cross_laid
 
     do cross_laid = 0, 1
-      if (cross_laid == 0) call new_world(world, ['cube', 'cube'])
-      if (cross_laid == 1) call new_world(world, ['hexapod', 'hexapod'])
+      call new_world(world, spread(merge('cube   ', 'hexapod', cross_laid == 0), 1, 2))
       world%blocks%x(3, 2) = 0.5_wp + d - depth
-      if (cross_laid == 1) then   ! the middle of a leg of each on that of the other
-        world%blocks%x(:, 2) = 0.5_wp + [d, d, d - depth]
-      end if
+      ! the middle of a leg of each on that of the other
+      if (cross_laid == 1) world%blocks%x(:, 2) = 0.5_wp + [d, d, d - depth]
       call find(world)
       force = 0.0_wp
       torque = 0.0_wp
       do t = 1, world%points%n
-        if (abs(world%points%item(t)%normal(3)) < 0.5_wp) cycle
-        force = force + world%points%item(t)%weight*world%points%item(t)%depth
-        torque = torque + cross(world%points%item(t)%arm_b, world%points%item(t)%normal) &
-          *world%points%item(t)%weight*world%points%item(t)%depth
+        associate (point => world%points%item(t))
+          if (abs(point%normal(3)) < 0.5_wp) cycle
+          force = force + point%weight*point%depth
+          torque = torque + cross(point%arm_b, point%normal)*point%weight*point%depth
+        end associate
       end do
       call check('a face carries', force > 0.9_wp*depth)
-      if (cross_laid == 0) call check('without tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
+      if (cross_laid == 0) call check('no tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
                                       1.0e-9_wp*d*force)
     end do
   end subroutine check_faces_on_one_another
@@ -166,12 +162,10 @@ contains
   subroutine check_points_to_come()
     real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
     type(touching_t) :: world
-    real(wp) :: v(3, 4), spin(4)
+    real(wp), parameter :: spin(4) = [0.0_wp, 0.0_wp, 0.0_wp, 2*speed/d], &
+      v(3, 4) = speed*reshape([0, 0, -1, 1, 0, 0, 0, 0, 1, 0, 0, 0], [3, 4])
     integer :: m
 
-    v = reshape([0.0_wp, 0.0_wp, -speed, speed, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, speed, &
-                 0.0_wp, 0.0_wp, 0.0_wp], [3, 4])
-    spin = [0.0_wp, 0.0_wp, 0.0_wp, 2*speed/d]
     do m = 1, 4
       call new_world(world, ['cube', 'cube'])
       world%blocks%x(3, 2) = 0.5_wp + d + gap
@@ -180,7 +174,7 @@ contains
       world%surface%search%margin = 1.0e-4_wp
       call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
       call check('comes', (world%points%n > 0) .eqv. (m == 1 .or. m == 4))
-      if (m == 4) call check('on the side that comes down', &
+      if (m == 4) call check('its side', &
         minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
       world%surface%search%margin = 0.0_wp
       call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
@@ -191,30 +185,21 @@ contains
   !> A ball touches a ball, a face, an edge, a corner and a wall at one point each.
   subroutine check_balls()
     type(touching_t) :: world
-    real(wp), parameter :: depth = 1.0e-4_wp
-    real(wp) :: way(3)
+    real(wp), parameter :: depth = 1.0e-4_wp, half = 0.5_wp*d, &
+      way(3, 5) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, sqrt(0.5_wp), &
+      sqrt(0.5_wp), 0.0_wp, spread(sqrt(1/3.0_wp), 1, 3), 0.0_wp, 0.0_wp, 1.0_wp], [3, 5]), &
+      at(3, 5) = reshape([0.5_wp + half, 0.5_wp, 0.5_wp, 0.5_wp + half, 0.5_wp, 0.5_wp, &
+      0.5_wp + half, 0.5_wp + half, 0.5_wp, spread(0.5_wp + half, 1, 3), 0.2_wp, 0.3_wp, 0.0_wp], &
+      [3, 5])   ! where the ball would touch
     integer :: m
 
     do m = 1, 5
-      way = [1.0_wp, 0.0_wp, 0.0_wp]
-      if (m == 1) call new_world(world, ['ball', 'ball'])
-      if (m > 1) call new_world(world, ['cube', 'ball'])
-      if (m == 1) world%blocks%x(:, 2) = 0.5_wp + way*(d - depth)
-      if (m == 2) world%blocks%x(:, 2) = 0.5_wp + way*(d - depth)
-      if (m == 3) then
-        way = [sqrt(0.5_wp), sqrt(0.5_wp), 0.0_wp]
-        world%blocks%x(:, 2) = 0.5_wp + 0.5_wp*d*[1, 1, 0] + way*(0.5_wp*d - depth)
-      else if (m == 4) then
-        way = sqrt(1.0_wp/3.0_wp)
-        world%blocks%x(:, 2) = 0.5_wp + 0.5_wp*d + way*(0.5_wp*d - depth)
-      else if (m == 5) then
-        world%blocks%x(:, 2) = [0.2_wp, 0.3_wp, 0.5_wp*d - depth]
-        way = [0.0_wp, 0.0_wp, 1.0_wp]
-      end if
+      call new_world(world, [merge('ball', 'cube', m == 1), 'ball'])
+      world%blocks%x(:, 2) = at(:, m) + way(:, m)*(half - depth)
       call find(world)
       call check('a ball touches once', world%points%n, 1)
       call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
-      call check('its normal', world%points%item(1)%normal, -way, 1.0e-12_wp)
+      call check('its normal', world%points%item(1)%normal, -way(:, m), 1.0e-12_wp)
     end do
   end subroutine check_balls
 
@@ -224,8 +209,7 @@ contains
     type(touching_t) :: new, world, moved
     real(wp), parameter :: step = 1.0e-8_wp
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'cube']
-    real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work
-    real(wp) :: worst, scale
+    real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work, worst, scale
     integer :: i, m, found, faded, detected, kinks, t
 
     kinks = 0
@@ -238,7 +222,7 @@ contains
         world = new
         world%blocks%q(:, 1) = random_rotation(1, i)
         world%blocks%q(:, 2) = random_rotation(2, i)
-        direction = [uniform(3, i, 1), uniform(3, i, 2), uniform(3, i, 3)] - 0.5_wp
+        direction = [(uniform(3, i, t), t=1, 3)] - 0.5_wp
         direction = direction/norm2(direction)
         call bring_together(world, direction, 3.0e-4_wp, detected)
         if (detected == 0) cycle
@@ -248,8 +232,8 @@ contains
           scale = sum(point%weight*point%depth)
           if (any([(any(abs(point(t)%weight_shift) > 0.0_wp), t=1, size(point))])) faded = faded + 1
         end associate
-        direction = [uniform(4, i, 1), uniform(4, i, 2), uniform(4, i, 3)] - 0.5_wp
-        axis = ([uniform(4, i, 4), uniform(4, i, 5), uniform(4, i, 6)] - 0.5_wp)/d
+        direction = [(uniform(4, i, t), t=1, 3)] - 0.5_wp
+        axis = ([(uniform(4, i, t), t=4, 6)] - 0.5_wp)/d
         here = energy(world)
         moved = world
         call move(moved, step*direction, step*axis)
@@ -365,9 +349,8 @@ contains
   end subroutine check_lists
 
   !> Whether what touches is the same in two worlds, bit by bit.
-  function same_points(one, two) result(same)
+  logical function same_points(one, two) result(same)
     type(touching_t), intent(in) :: one, two
-    logical :: same
     integer :: n
 
     n = one%points%n

@@ -52,10 +52,9 @@ contains
   end subroutine make
 
   !> Whether a list is that of some bodies.
-  function is(displacements, bodies) result(yes)
+  logical function is(displacements, bodies) result(yes)
     type(displacements_t), intent(in) :: displacements
     integer, intent(in) :: bodies(:)
-    logical :: yes
     type(displacements_t) :: wanted
     integer :: n
 

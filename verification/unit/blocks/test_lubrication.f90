@@ -97,8 +97,7 @@ contains
     end do
     expected = v - (film_impulse(mu, d/2/sides, a, 4*cell) &
       - film_impulse(mu, d/2/sides, a, sides*gap))/world%blocks%mass(1)
-    call check(kind//': speed lost in the film', -world%blocks%v(3, 1), expected, &
-               1.0e-3_wp*(v - expected))
+    call check(kind//': speed lost', -world%blocks%v(3, 1), expected, 1.0e-3_wp*(v - expected))
     call check(kind//': not touched yet', world%blocks%contacts(1), 0)
   end subroutine check_fall
 
@@ -185,7 +184,7 @@ contains
     call lubricate(world%walls, world%blocks, dt, 0.0_wp, world%contacts%lubrication, force)
     call check('some pairs have a film, most have none', active > n/2 .and. active < n*(n - 1)/4)
     do i = 1, n
-      call check('force on a sphere of the swarm', force(:, i), expected(:, i), &
+      call check('force in the swarm', force(:, i), expected(:, i), &
                  1.0e-12_wp*maxval(abs(expected)))
     end do
   end subroutine check_swarm

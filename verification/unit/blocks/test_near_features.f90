@@ -68,13 +68,12 @@ contains
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], 1.0_wp + apart, no_turn, &
       no_turn)), cube, cube, search, near)
     call check('one corner of each', all([near%of_a%n, near%of_b%n] == 1))
-    call check('seven hundredths away', [near%of_a%away(1), near%of_b%away(1)], &
+    call check('how far away', [near%of_a%away(1), near%of_b%away(1)], &
       [0.07_wp, 0.07_wp], 1.0e-14_wp)
     call check('the corner of b', cube%vertex(:, near%of_b%vertex(1)), -[0.5_wp, 0.5_wp, 0.5_wp])
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.4_wp, 0.3_wp, 1.05_wp], &
       no_turn, no_turn)), ball, cube, search, near)
-    call check('a ball under a cube', all([near%of_a%n, near%of_b%n, near%n_crossings] &
-      == [1, 0, 0]))
+    call check('ball under cube', all([near%of_a%n, near%of_b%n, near%n_crossings] == [1, 0, 0]))
     call check('is as far as its surface', near%of_a%away(1), 0.05_wp, 1.0e-14_wp)
   end subroutine check_corner_and_ball
 

@@ -15,8 +15,7 @@ module test_overlap_m
   private
   public :: test_overlap
 
-  real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-  real(wp), parameter :: origin(3) = 0.0_wp
+  real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], origin(3) = 0.0_wp
   real(wp), parameter :: d = 0.02_wp   !! edge of the cube, diameter of the ball [m]
   character(*), parameter :: tank = '&run t_end=1 physics="dry"/ &shape name="cube" kind="cube" ' &
     //'size=.02/ &shape name="ball" kind="sphere" size=.02/ &shape name="hexapod" ' &
@@ -39,31 +38,39 @@ contains
     call check_bins()
   end subroutine test_overlap
 
+  !> Depth of shape b at x in shape a at the origin; upright if not told otherwise.
+  real(wp) function depth_in(a, b, x, q_b, q_a)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: x(3)
+    real(wp), intent(in), optional :: q_b(4), q_a(4)
+    real(wp) :: q(4, 2)
+
+    q = spread(upright, 2, 2)
+    if (present(q_a)) q(:, 1) = q_a
+    if (present(q_b)) q(:, 2) = q_b
+    depth_in = overlap_depth(shapes(a), origin, q(:, 1), shapes(b), x, q(:, 2))
+  end function depth_in
+
   !> Cubes pushed into one another along a face normal, corner first, and edge across edge.
   subroutine check_pairs_of_boxes()
     real(wp), parameter :: deep = 1.3e-3_wp
-    real(wp) :: corner(4), edge(4), across(4)
+    real(wp) :: corner(4), edge(4), across(4), x(3)
 
     corner = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], atan(sqrt(2.0_wp)))
     edge = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.25_wp*pi)
     across = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], 0.25_wp*pi)
-    call check('face on face', overlap_depth(shapes(1), origin, upright, shapes(1), &
-      [2.0e-3_wp, 1.0e-3_wp, d - deep], upright), deep, 1.0e-15_wp)
-    call check('apart', overlap_depth(shapes(1), &
-      origin, upright, shapes(1), [0.0_wp, 0.0_wp, d + 1.0e-6_wp], upright), 0.0_wp)
-    call check('touching', overlap_depth(shapes(1), origin, upright, shapes(1), &
-      [0.0_wp, 0.0_wp, d], upright), 0.0_wp, 1.0e-15_wp)
-    call check('corner on face', overlap_depth(shapes(1), origin, upright, shapes(1), &
-      [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner), deep, 1.0e-14_wp)
-    call check('and the other way round', overlap_depth(shapes(1), [1.0e-3_wp, 2.0e-3_wp, &
-      0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner, shapes(1), origin, upright), deep, 1.0e-14_wp)
+    call check('face on face', depth_in(1, 1, [2.0e-3_wp, 1.0e-3_wp, d - deep]), deep, 1.0e-15_wp)
+    call check('apart', depth_in(1, 1, [0.0_wp, 0.0_wp, d + 1.0e-6_wp]), 0.0_wp)
+    call check('touching', depth_in(1, 1, [0.0_wp, 0.0_wp, d]), 0.0_wp, 1.0e-15_wp)
+    x = [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep]
+    call check('corner on face', depth_in(1, 1, x, corner), deep, 1.0e-14_wp)
+    call check('and the other way round', depth_in(1, 1, -x, q_a=corner), deep, 1.0e-14_wp)
     ! each edge lies below the ridge of the other and is nearest to one of its two faces
-    call check('edge across edge', overlap_depth(shapes(1), origin, edge, shapes(1), &
-      [0.0_wp, 0.0_wp, d*sqrt(2.0_wp) - deep], across), deep/sqrt(2.0_wp), 1.0e-14_wp)
-    call check('cube in the notch of a hexapod', overlap_depth(shapes(3), origin, &
-      upright, shapes(1), [d - deep, d - 2*deep, 0.0_wp], upright), sqrt(5.0_wp)*deep, 1.0e-15_wp)
-    call check('cube beside a leg', overlap_depth(shapes(3), origin, upright, shapes(1), &
-      [d, d, 0.0_wp], upright), 0.0_wp, 1.0e-15_wp)
+    call check('edge across edge', depth_in(1, 1, [0.0_wp, 0.0_wp, d*sqrt(2.0_wp) - deep], across, &
+      edge), deep/sqrt(2.0_wp), 1.0e-14_wp)
+    call check('cube in the notch of a hexapod', depth_in(3, 1, [d - deep, d - 2*deep, 0.0_wp]), &
+      sqrt(5.0_wp)*deep, 1.0e-15_wp)
+    call check('cube beside a leg', depth_in(3, 1, [d, d, 0.0_wp]), 0.0_wp, 1.0e-15_wp)
   end subroutine check_pairs_of_boxes
 
   !> The depth does not depend on the place and attitude of the pair as a whole.
@@ -72,7 +79,7 @@ contains
     real(wp) :: depth, other, q(4), x(3)
     integer :: n
 
-    depth = overlap_depth(shapes(3), origin, upright, shapes(3), r, upright)
+    depth = depth_in(3, 3, r)
     ! the deepest point lies on a face of one, 5 and 10 mm from an inner edge of the other
     call check('hexapods overlap, no deeper', depth <= sqrt(125.0e-6_wp))
     call check('and found by a sample near by', depth, sqrt(125.0e-6_wp), 0.07_wp*d)
@@ -86,14 +93,12 @@ contains
 
   !> Balls are round, whatever their tetrahedra.
   subroutine check_balls()
-    call check('ball on ball', overlap_depth(shapes(2), origin, upright, shapes(2), &
-      [0.0_wp, 0.6_wp*d, 0.7_wp*d], upright), d*(1.0_wp - sqrt(0.85_wp)), 1.0e-16_wp)
-    call check('ball on face', overlap_depth(shapes(2), &
-      [3.0e-3_wp, 0.0_wp, 0.9_wp*d], upright, shapes(1), origin, upright), 0.1_wp*d, 1.0e-16_wp)
-    call check('ball at corner', overlap_depth(shapes(1), origin, upright, shapes(2), &
-      0.5_wp*d + 0.25_wp*d*[1, 1, 1], upright), d*(0.5_wp - 0.25_wp*sqrt(3.0_wp)), 1.0e-16_wp)
-    call check('ball inside', overlap_depth(shapes(1), origin, upright, shapes(2), &
-      [0.0_wp, 0.1_wp*d, 0.2_wp*d], upright), 0.8_wp*d, 1.0e-16_wp)
+    call check('ball on ball', depth_in(2, 2, [0.0_wp, 0.6_wp*d, 0.7_wp*d]), &
+      d*(1.0_wp - sqrt(0.85_wp)), 1.0e-16_wp)
+    call check('ball on face', depth_in(2, 1, -[3.0e-3_wp, 0.0_wp, 0.9_wp*d]), 0.1_wp*d, 1.0e-16_wp)
+    call check('ball at corner', depth_in(1, 2, spread(0.75_wp*d, 1, 3)), &
+      d*(0.5_wp - 0.25_wp*sqrt(3.0_wp)), 1.0e-16_wp)
+    call check('ball inside', depth_in(1, 2, [0.0_wp, 0.1_wp*d, 0.2_wp*d]), 0.8_wp*d, 1.0e-16_wp)
   end subroutine check_balls
 
   !> Bodies behind walls.
@@ -111,8 +116,7 @@ contains
       wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), 2.0e-3_wp, 1.0e-15_wp)
     call check('cube in the upper wall in x', &
       wall_depth(shapes(1), [0.3_wp, 0.05_wp, 1.1_wp], upright, walls), 0.01_wp, 1.0e-15_wp)
-    call check('out of the open top', &
-      wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.5_wp], upright, walls), 0.0_wp)
+    call check('open top', wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.5_wp], upright, walls), 0.0_wp)
     call check('ball in the floor', &
       wall_depth(shapes(2), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), 2.0e-3_wp, 1.0e-15_wp)
     case%boundary%kind(:, 2) = 'periodic'
@@ -180,11 +184,9 @@ contains
     world%blocks%x(:, n + 1) = world%blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
     call check('room', has_place(world%walls, world%blocks, n + 1, world%overlap))
     world%blocks%x(:, n + 1) = world%blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room beside the image', .not. has_place(world%walls, world%blocks, n + 1, &
-      world%overlap))
+    call check('beside the image', .not. has_place(world%walls, world%blocks, n + 1, world%overlap))
     world%blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
-    call check('no room in the floor', .not. has_place(world%walls, world%blocks, n + 1, &
-      world%overlap))
+    call check('in the floor', .not. has_place(world%walls, world%blocks, n + 1, world%overlap))
   end subroutine check_run
 
   !> The list of near pairs against all pairs, with and without periods.

@@ -129,8 +129,7 @@ contains
       call check('its force', contacts%sleep%frozen%force(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
       call check('its energy', contacts%sleep%frozen%energy(1), energy, 1.0e-9_wp*energy)
-      call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
-        1.0e-9_wp*load)
+      call check('bears it', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], 1.0e-9_wp*load)
       call check('no more contact points', contacts%detected%points%n, 0)
       call check('but a counterpart', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
         == [1, 1, -5]))
@@ -139,8 +138,7 @@ contains
         1.0e-12_wp*blocks%mass(1)*slow)
       contacts%steady(1, 1) = 0.1_wp*load
       call start_step(world)
-      call check('at work again', all([contacts%displacements%n, contacts%sleep%frozen%n] &
-        == [1, 0]))
+      call check('at work', all([contacts%displacements%n, contacts%sleep%frozen%n] == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp)
       call check('touches again', contacts%detected%points%n, 1)
     end associate
@@ -153,8 +151,7 @@ contains
     call begin(1.0_wp, 1, 0.0_wp, world)
     call start_step(world)
     call check('on a ball that is held', all(world%blocks%asleep .eqv. [.false., .true.]))
-    call check('which bears it', world%contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, -load], &
-      1.0e-9_wp*load)
+    call check('bears it', world%contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, -load], 1.0e-9_wp*load)
   end subroutine check_held
 
 end module test_resting_m

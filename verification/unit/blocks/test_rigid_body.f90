@@ -13,6 +13,8 @@ module test_rigid_body_m
   public :: test_rigid_body
 
   real(wp), parameter :: no_gravity(3) = 0.0_wp
+  type(world_t), target :: world
+  type(blocks_t), pointer :: blocks => world%blocks
   character(*), parameter :: brick = '&body shape="brick" position=.1,.2,.3 '
 
 contains
@@ -20,16 +22,15 @@ contains
   subroutine test_rigid_body()
     call check_start()
     call check_free_top()
-    call check_t_endop()
+    call check_top_at_end()
     call check_free_fall()
     call check_prescribed()
     call check_after_fluid()
   end subroutine test_rigid_body
 
   !> Bricks with three different moments of inertia, and balls.
-  subroutine start(bodies, world)
+  subroutine start(bodies)
     character(*), intent(in) :: bodies
-    type(world_t), intent(out) :: world
 
     call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="brick" ' &
       //'kind="box" size=.01,.02,.03/ &shape name="ball" kind="sphere" size=.02/ '//bodies, world)
@@ -37,19 +38,13 @@ contains
 
   !> Order, masses, poses and presence of the bodies of a case.
   subroutine check_start()
-    type(world_t), target :: world
-    type(blocks_t), pointer :: blocks
-
     call start('&body shape="ball" position=3*.1 quaternion=-2,0,0,2 velocity=1,0,0/ &body ' &
       //'shape="brick" position=3*.2 release_time=.5 velocity=0,2,0 angular_velocity=3,0,0/ ' &
-      //'&drop shape="brick" position=3*.3 count=3 first_time=1 interval=.25/', world)
-    blocks => world%blocks
+      //'&drop shape="brick" position=3*.3 count=3 first_time=1 interval=.25/')
     call check('five bodies', blocks%n, 5)
     call check('their shapes', all(blocks%shape == [2, 1, 1, 1, 1]))
-    call check('only the first is there', &
-      all(blocks%present .eqv. [.true., .false., .false., .false., .false.]))
-    call check('due times', &
-      blocks%release_time, [0.0_wp, 0.5_wp, 1.0_wp, 1.25_wp, 1.5_wp], 1.0e-15_wp)
+    call check('one there', all(blocks%present .eqv. [.true., .false., .false., .false., .false.]))
+    call check('due', blocks%release_time, [0.0_wp, 0.5_wp, 1.0_wp, 1.25_wp, 1.5_wp], 1.0e-15_wp)
     call check('mass of the brick', blocks%mass(2), 2300.0_wp*6.0e-6_wp, 1.0e-15_wp)
     call check('quaternion with w >= 0', &
       blocks%q(:, 1), sqrt([0.5_wp, 0.0_wp, 0.0_wp, 0.5_wp])*[1, 1, 1, -1], 1.0e-15_wp)
@@ -59,22 +54,18 @@ contains
     call release_body(0.6_wp, 2, blocks)
     call check('true time of release', blocks%release_time(2), 0.6_wp)
     call check('velocity at release', blocks%v(2, 2), 2.0_wp)
-    call check('momentum at release', blocks%l(1, 2), 3.0_wp*world%shapes(1)%inertia(1, 1), &
-      1.0e-18_wp)
+    call check('its momentum', blocks%l(1, 2), 3.0_wp*world%shapes(1)%inertia(1, 1), 1.0e-18_wp)
     call check('potential energy', potential_energy([0.0_wp, 0.0_wp, -10.0_wp], blocks), &
       10.0_wp*sum(blocks%mass*blocks%x(3, :)), 1.0e-15_wp)
   end subroutine check_start
 
   !> A torque-free top keeps its angular momentum exactly and its energy to second order.
   subroutine check_free_top()
-    type(world_t), target :: world
-    type(blocks_t), pointer :: blocks
     real(wp) :: l(3), energy, worst, time_step
     integer :: n
 
     ! near the unstable middle axis
-    call start(brick//'angular_velocity=1,10,.5/', world)
-    blocks => world%blocks
+    call start(brick//'angular_velocity=1,10,.5/')
     l = blocks%l(:, 1)
     energy = kinetic_energy(blocks)
     worst = 0.0_wp
@@ -94,42 +85,38 @@ contains
 
   !> The top of the reference table D1_top_torque_free.csv at t = 3: moments 1, 2, 3 and
   !! omega = (1.7, 0, 1); second order in the step.
-  subroutine check_t_endop()
+  subroutine check_top_at_end()
     real(wp), parameter :: t_end = 3.0_wp
     real(wp), parameter :: q_end(4) = [-0.622800788318_wp, -0.278080199769_wp, 0.328467519813_wp, &
       0.653375595653_wp]
     type(shape_t) :: top(1)
-    type(world_t) :: world
-    type(blocks_t) :: blocks
+    type(blocks_t) :: bodies
     real(wp) :: error(2)
     integer :: n, m, steps
 
-    call start(brick//'angular_velocity=1.7,0,1/', world)
+    call start(brick//'angular_velocity=1.7,0,1/')
     top = world%shapes(1:1)
     top(1)%inertia = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
       3.0_wp], [3, 3])
     do m = 1, 2
       steps = 200*m
-      call blocks_init(world%case, top, blocks)
+      call blocks_init(world%case, top, bodies)
       do n = 1, steps
-        call drift(t_end/real(steps, wp), blocks)
+        call drift(t_end/real(steps, wp), bodies)
       end do
-      error(m) = norm2(blocks%q(:, 1) - sign(1.0_wp, dot_product(blocks%q(:, 1), q_end))*q_end)
+      error(m) = norm2(bodies%q(:, 1) - sign(1.0_wp, dot_product(bodies%q(:, 1), q_end))*q_end)
     end do
     call check('attitude of the top', error(2), 0.0_wp, 2.0e-4_wp)
     call check('second order', error(1)/error(2), 4.0_wp, 0.2_wp)
-  end subroutine check_t_endop
+  end subroutine check_top_at_end
 
   !> Half drift, kick, half drift is exact for a constant force.
   subroutine check_free_fall()
     real(wp), parameter :: g(3) = [0.3_wp, 0.0_wp, -9.81_wp]
-    type(world_t), target :: world
-    type(blocks_t), pointer :: blocks
     real(wp) :: x(3), v(3), t
     integer :: n
 
-    call start(brick//'velocity=.1,-.2,.3/', world)
-    blocks => world%blocks
+    call start(brick//'velocity=.1,-.2,.3/')
     x = blocks%x(:, 1)
     v = blocks%v(:, 1)
     blocks%fluid_force(:, 1) = blocks%mass(1)*[0.0_wp, 1.0_wp, 0.0_wp]
@@ -145,13 +132,10 @@ contains
 
   !> A fixed body with given rates moves and turns at them whatever acts on it.
   subroutine check_prescribed()
-    type(world_t), target :: world
-    type(blocks_t), pointer :: blocks
     real(wp), parameter :: omega(3) = [0.0_wp, 0.5_wp, 2.0_wp]
     integer :: n
 
-    call start(brick//'fixed=T velocity=0,0,.4 angular_velocity=0,.5,2/', world)
-    blocks => world%blocks
+    call start(brick//'fixed=T velocity=0,0,.4 angular_velocity=0,.5,2/')
     blocks%contact_force = 1.0e3_wp
     blocks%contact_torque = 1.0e3_wp
     do n = 1, 10
@@ -169,12 +153,9 @@ contains
   !! the step.
   subroutine check_after_fluid()
     real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp], dt = 0.01_wp
-    type(world_t), target :: world
-    type(blocks_t), pointer :: blocks
     real(wp) :: force(3, 1), torque(3, 1), v(3), l(3)
 
-    call start(brick//'velocity=.1,-.2,.3 angular_velocity=5,2,1/', world)
-    blocks => world%blocks
+    call start(brick//'velocity=.1,-.2,.3 angular_velocity=5,2,1/')
     v = blocks%v(:, 1)
     l = blocks%l(:, 1)
     call begin_step(blocks)

@@ -51,13 +51,12 @@ contains
     call check('moved too far', .not. short_list_holds(now, cube%bounding_radius, &
       cube%bounding_radius, short))
     now%gap = 0.9_wp*gap
-    call check('less counts as a contact point', short_list_holds(now, cube%bounding_radius, &
+    call check('less counts', short_list_holds(now, cube%bounding_radius, &
       cube%bounding_radius, short))
     now%poses = short%when
     call choose_features(now, near%valid - 0.5_wp*gap, search, cube, cube, near, short)
     now%poses%x_b(1) = 0.49_wp*gap
-    call check('the lists hold', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
-      short))
+    call check('held', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
     now%poses%x_b(1) = 0.51_wp*gap
     call check('no longer than the lists', &
       .not. short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
@@ -65,7 +64,7 @@ contains
     call list_features(now, cube, cube, search, near)
     call choose_features(now, 0.0_wp, search, cube, cube, near, short)
     now%poses%x_b(3) = 3.0_wp - 0.999_wp*near%valid
-    call check('as long as empty lists', short_list_holds(now, cube%bounding_radius, &
+    call check('empty lists', short_list_holds(now, cube%bounding_radius, &
       cube%bounding_radius, short))
   end subroutine check_how_long
 
@@ -88,8 +87,7 @@ contains
       call choose_features(now, way, search, cube, cube, near, short)
       now = meeting_at(moved(i, min(short%until - gap, short%left), now%poses))
       now%gap = gap
-      call check('holds still', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
-        short))
+      call check('holds', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
       call check_vertices(now%b_in_a, short%item(:short%of_a - 1), n)
       call check_vertices(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
       call check_crossings(now%a_in_b, short%item(short%edges:short%n), n)

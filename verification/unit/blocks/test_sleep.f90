@@ -198,8 +198,7 @@ contains
       one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g, 0.0_wp, 1.0e-12_wp)
     call check('the slab bears all', one%blocks%contact_force(3, 1), -n*one%blocks%mass(2)*g, &
       n*rest_tolerance*one%blocks%mass(2)*g)
-    call check('about its middle', &
-      one%blocks%contact_torque(:, 1), 0.0_wp, 1.0e-4_wp*one%blocks%mass(2)*g*d)
+    call check('torque', one%blocks%contact_torque(:, 1), 0.0_wp, 1.0e-4_wp*one%blocks%mass(2)*g*d)
   end subroutine check_rest
 
   !> A cube that slides into a sleeper pushes it as if it had been awake, momentum is kept, and both
@@ -260,10 +259,8 @@ contains
     call check('both are awake', count(one%blocks%asleep), 0)
     call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
     call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
-    call check('like the lower one without sleep', &
-      one%blocks%x(:, 1) - two%blocks%x(:, 1), 0.0_wp, 0.01_wp*d)
-    call check('like the upper one without sleep', &
-      one%blocks%x(:, 2) - two%blocks%x(:, 2), 0.0_wp, 0.01_wp*d)
+    call check('the lower one as awake', one%blocks%x(:, 1) - two%blocks%x(:, 1), 0.0_wp, 0.01_wp*d)
+    call check('the upper one as awake', one%blocks%x(:, 2) - two%blocks%x(:, 2), 0.0_wp, 0.01_wp*d)
   end subroutine check_support
 
   !> On a slope a little steeper than friction bears a cube never sleeps, on one less steep it does.

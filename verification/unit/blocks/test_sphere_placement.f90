@@ -45,10 +45,9 @@ contains
   end subroutine build
 
   !> Height of the centroid over a floor below direction -u, by the spheres [m].
-  pure function height(s, u) result(h)
+  pure real(wp) function height(s, u) result(h)
     type(shape_t), intent(in) :: s
     integer, intent(in) :: u(3)
-    real(wp) :: h
 
     h = maxval(matmul(u/norm2(real(u, wp)), s%sphere_centre) + s%sphere_radius)
   end function height
@@ -66,12 +65,10 @@ contains
     real(wp) :: lowest, highest
 
     call build('hexapod', 'centroid', 1, 0.0_wp, s)
-    call check('hexapod, centroid 1: heights', heights(s), &
-               [31.83e-3_wp, 28.04e-3_wp, 27.04e-3_wp], 5e-6_wp)
+    call check('centroid 1: heights', heights(s), [31.83e-3_wp, 28.04e-3_wp, 27.04e-3_wp], 5e-6_wp)
     call check('they differ from the true ones', any(abs(heights(s) - true_heights) > 1.5e-3_wp))
     call height_errors(s, lowest, highest)
-    call check('warned of: short of the surface', &
-               lowest < minval(heights(s) - true_heights) + 1e-4_wp)
+    call check('warned of: too low', lowest < minval(heights(s) - true_heights) + 1e-4_wp)
     call check('warned of: beyond it', highest > maxval(heights(s) - true_heights) - 3e-4_wp)
     call build('sphere', 'centroid', 1, 0.0_wp, s)
     call height_errors(s, lowest, highest)
@@ -103,8 +100,7 @@ contains
     call check('inscribed: each touches four faces', worst, 0.0_wp, 1e-12_wp)
     call check('inscribed: one for each tetrahedron at the surface', size(s%sphere_radius), m)
     call build('hexapod', 'inscribed', 1, 0.0_wp, s)
-    call check('hexapod, inscribed 1: heights', heights(s), &
-               [30.00e-3_wp, 26.53e-3_wp, 25.77e-3_wp], 5e-6_wp)
+    call check('inscribed 1: heights', heights(s), [30.00e-3_wp, 26.53e-3_wp, 25.77e-3_wp], 5e-6_wp)
   end subroutine inscribed_spheres
 
   !> Within 0.5 mm of the true heights in all three poses, and in their order.
@@ -121,8 +117,7 @@ contains
       call height_errors(s, lowest, highest)
       call check('hexapod, dense: never beyond the surface', highest, 0.0_wp, 1e-9_wp)
       call check('hexapod, dense: never 0.5 mm short of it', lowest > -0.5e-3_wp)
-      call check('hexapod, dense: number', size(s%sphere_radius) > 1500 &
-        .and. size(s%sphere_radius) < 3000)
+      call check('dense: number', size(s%sphere_radius) > 1500 .and. size(s%sphere_radius) < 3000)
     end do
   end subroutine dense_heights
 

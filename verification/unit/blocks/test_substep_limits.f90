@@ -44,10 +44,8 @@ contains
     detected%bounding_radius = [0.1_wp, 0.1_wp]
     detected%smallest = 0.02_wp
     detected%unlisted_gap = 0.05_wp
-    call check('a share of the step', &
-      substep_limit(walls, detected, blocks, 0.01_wp, limits), 0.005_wp)
-    call check('of the contact time', &
-      substep_limit(walls, detected, blocks, 1.0_wp, limits), 0.01_wp)
+    call check('of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), 0.005_wp)
+    call check('of contact', substep_limit(walls, detected, blocks, 1.0_wp, limits), 0.01_wp)
     blocks%v(3, 2) = -100.0_wp
     call check('no jump into another', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       0.05_wp/100.0_wp, 1.0e-18_wp)

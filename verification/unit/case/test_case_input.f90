@@ -10,8 +10,7 @@ module test_case_input_m
   private
   public :: test_case_input
 
-  character(*), parameter :: lf = new_line('a')
-  character(*), parameter :: run = '&run t_end = 1 /'//lf
+  character(*), parameter :: lf = new_line('a'), run = '&run t_end = 1 /'//lf
   character(*), parameter :: grid = '&grid cells = 6, 2, 4 length = 0.3, 0.1, 0.2 /'//lf
   character(*), parameter :: base = run//grid   ! two lines
   character(*), parameter :: cube = base//'&shape name = ''c'' kind = ''cube'' size = 0.02 /'//lf
@@ -185,8 +184,7 @@ contains
 
   !> A family of stones: its variables, its members, and who gets which.
   subroutine test_rock()
-    character(*), parameter :: a = '&shape name=''a'' kind='
-    character(*), parameter :: rock = base//a//'''rock'' '
+    character(*), parameter :: a = '&shape name=''a'' kind=', rock = base//a//'''rock'' '
     type(case_t) :: case
     type(problems_t) :: problems
 

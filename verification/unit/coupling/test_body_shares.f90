@@ -83,8 +83,7 @@ contains
   end subroutine hexapod
 
   !> Largest difference between the share of a cut cell and what its tetrahedra fill of it.
-  function worst_cell() result(worst)
-    real(wp) :: worst
+  real(wp) function worst_cell() result(worst)
     real(wp) :: share, part, moment(3), low(3)
     integer :: m, t
 
@@ -121,8 +120,7 @@ contains
     beta = minval(body%beta(:body%n_face))
     call check('closed faces', body%n_face == n_face .and. beta >= 1.0_wp)
     call check('two hits on each link', body%n_hit, 2*(3*3 + 4*3 + 4*3))
-    call check('half way between centres', body%at(:body%n_hit), spread(0.5_wp, 1, body%n_hit), &
-               1.0e-12_wp)
+    call check('half way between', body%at(:body%n_hit), spread(0.5_wp, 1, body%n_hit), 1.0e-12_wp)
     call check('no cell is cut', body%first_tet(body%n_cell + 1), 1)
     call count_subcells(3, work, body)
     call check('counted: the same cells', body%n_cell == 36 .and. all(body%alpha(:36) >= 1.0_wp))

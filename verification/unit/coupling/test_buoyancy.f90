@@ -20,6 +20,7 @@ module test_buoyancy_m
   real(wp), parameter :: length(3) = [0.16_wp, 0.12_wp, 0.18_wp]   !! [m]
   real(wp), parameter :: level = 0.0913_wp                         !! inside a cell [m]
   type(one_body_t) :: block
+  real(wp) :: force(6, 1)
 
 contains
 
@@ -48,22 +49,25 @@ contains
     call mix_fluid(block%case%fluid, block%flow)
   end subroutine build
 
+  subroutine push()
+    call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
+      force)
+  end subroutine push
+
   !> All liquid: -rho V g whatever the pose, the direction of gravity and the period; no torque.
   subroutine submerged(kind, size, position)
     character(*), intent(in) :: kind
     real(wp), intent(in) :: size(:), position(3)
-    real(wp) :: force(6, 1), weight(3)
+    real(wp) :: weight(3)
 
     call build(kind, size, position, 0.6_wp, 1.0_wp)
     block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
     weight = block%case%fluid%liquid_density*block%bodies%volume(1)*block%case%fluid%gravity
-    call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         force)
+    call push()
     call check(kind//': force', force(1:3, 1), -weight, 1.0e-12_wp*norm2(weight))
     call check(kind//': no torque', norm2(force(4:6, 1)), 0.0_wp, 1.0e-12_wp*norm2(weight)*0.05_wp)
     block%bodies%present = .false.
-    call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         force)
+    call push()
     call check(kind//': nothing before its release', all(abs(force) <= 0.0_wp))
   end subroutine submerged
 
@@ -71,16 +75,14 @@ contains
   subroutine floating_box()
     real(wp), parameter :: size(3) = [0.05_wp, 0.031_wp, 0.043_wp], &
       position(3) = [0.0771_wp, 0.0611_wp, 0.0957_wp]
-    real(wp) :: force(6, 1), mass, depth
+    real(wp) :: mass, depth
 
     call build('box', size, position, 0.0_wp, level)
     depth = level - (position(3) - 0.5_wp*size(3))
     mass = size(1)*size(2)*(block%case%fluid%liquid_density*depth &
                             + block%case%fluid%gas_density*(size(3) - depth))
-    call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         force)
-    call check('floating box: force', force(1:3, 1), [0.0_wp, 0.0_wp, 9.81_wp*mass], &
-               1.0e-12_wp*9.81_wp*mass)
+    call push()
+    call check('it floats', force(1:3, 1), [0.0_wp, 0.0_wp, 9.81_wp*mass], 1.0e-12_wp*9.81_wp*mass)
     call check('floating box: no torque', norm2(force(4:6, 1)), 0.0_wp, 1.0e-14_wp)
   end subroutine floating_box
 
@@ -89,7 +91,7 @@ contains
   subroutine through_the_level(position)
     real(wp), intent(in) :: position(3)
     type(rigid_flux_t) :: flux
-    real(wp) :: force(6, 1), defect(6, 3, 1), by_faces(6, 1), expected(6), weight
+    real(wp) :: defect(6, 3, 1), by_faces(6, 1), expected(6), weight
     real(wp) :: part, part_moment(3)
     logical, allocatable :: active(:, :, :)
     real(wp) :: mass, moment(3), turn(3, 3), corner(3, 4)
@@ -110,12 +112,10 @@ contains
       end do
       expected = [-mass*fluid%gravity, -cross(moment, fluid%gravity)]
       weight = norm2(expected(1:3))
-      call displaced_force(block%grid, fluid, solid, block%bodies, block%flow%c, force)
+      call push()
       call check('through the level: force', force(1:3, 1), expected(1:3), 1.0e-10_wp*weight)
-      call check('through the level: torque', force(4:6, 1), expected(4:6), &
-                 1.0e-10_wp*weight*0.03_wp)
-      call check('through the level: it would turn', norm2(expected(4:6)) > 1.0e-3_wp*weight &
-                 *0.03_wp)
+      call check('in the level: torque', force(4:6, 1), expected(4:6), 1.0e-10_wp*weight*0.03_wp)
+      call check('in the level: it would turn', norm2(expected(4:6)) > 1.0e-3_wp*weight*0.03_wp)
 
       call still_pressure()
       allocate (active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
@@ -126,7 +126,7 @@ contains
       call force_from_faces(block%grid, block%bodies, flux, block%flow%p, by_faces)
       defect = mass_defect(block%grid, fluid, solid, block%bodies, flux, block%flow)
       force(:, 1) = -matmul(defect(:, :, 1), fluid%gravity)
-      call check('faces and correction: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
+      call check('by faces: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
                  1.0e-10_wp*weight)
       call check('faces and correction: torque', by_faces(4:6, 1) + force(4:6, 1), expected(4:6), &
                  1.0e-10_wp*weight*0.03_wp)

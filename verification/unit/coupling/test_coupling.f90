@@ -137,8 +137,7 @@ contains
     block%blocks%fluid_torque(:, 1) = force(4:6, 1)
     call begin()
     call advance()
-    call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
-               0.02_wp*abs(expected))
+    call check('let go: first step', -block%blocks%v(3, 1)/(dt*g), expected, 0.02_wp*abs(expected))
   end subroutine let_go
 
   !> A box that moves and spins: the motion found with the pressure is that of the forces.
@@ -284,8 +283,7 @@ contains
     gain(1:3) = case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
     call begin()
-    call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
-               1.0e-12_wp)
+    call check('predicted: the last acceleration', coupling%extrapolated(:, 1), dt*gain, 1.0e-12_wp)
   end subroutine goes_on_as_before
 
   !> A cut cell weighs by its level, but gas in its open part has the inertia of gas.

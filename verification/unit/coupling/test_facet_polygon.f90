@@ -76,17 +76,15 @@ contains
 
   !> The line in which a plane meets the polygon parts it: ends in the plane and on the outline.
   subroutine lines_in_planes()
-    real(wp) :: line(3, 2, 4), x(3)
-    integer :: d, n, e
+    real(wp) :: line(3, 2, 4)
+    integer :: d, n
 
     do d = 1, 3
       call cut_by_plane(hexagon, d, 0.25_wp, line, n)
       call check('one line', n, 1)
-      call check('in the plane', line(d, :, 1), [0.25_wp, 0.25_wp])
-      do e = 1, 2
-        x = line(:, e, 1)
-        call check('in the polygon', x(3), 0.3_wp*x(1) - 0.7_wp*x(2) + 1.0_wp, 1.0e-14_wp)
-      end do
+      call check('in the plane', line(d, :, 1), 0.25_wp)
+      call check('in the polygon', line(3, :, 1), 0.3_wp*line(1, :, 1) - 0.7_wp*line(2, :, 1) &
+        + 1.0_wp, 1.0e-14_wp)
     end do
     call cut_by_plane(hexagon, 1, 9.0_wp, line, n)
     call check('no line beyond it', n, 0)
@@ -99,9 +97,7 @@ contains
     integer :: n
 
     p%n = 3
-    p%x(:, 1) = [0.0_wp, 0.0_wp, 0.0_wp]
-    p%x(:, 2) = [1.0_wp, 0.0_wp, 1.0_wp]
-    p%x(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
+    p%x(:, :3) = reshape([0, 0, 0, 1, 0, 1, 0, 1, 0]*1.0_wp, [3, 3])
     call cut_by_plane(p, 3, 1.0_wp, line, n)
     call check('touched from below: none', n, 0)
     call cut_by_plane(p, 3, 0.0_wp, line, n)
@@ -111,18 +107,16 @@ contains
 
   !> Points on a plane belong to the cell above; the lower end of a line counts, the upper not.
   subroutine ranges()
-    integer :: first, last
+    integer :: first(5), last(5)
 
-    call cells_between(0.0_wp, 2.0_wp, first, last)
-    call check('from plane to plane', first == 1 .and. last == 2)
-    call cells_between(2.0_wp, 2.0_wp, first, last)
-    call check('a point on a plane', first == 3 .and. last == 3)
-    call centres_between(1.5_wp, 3.5_wp, first, last)
-    call check('centres from 1.5 up to 3.5', first == 2 .and. last == 3)
-    call centres_between(3.4_wp, 1.6_wp, first, last)
-    call check('centres in any order', first == 3 .and. last == 3)
-    call centres_between(1.6_wp, 2.4_wp, first, last)
-    call check('no centre between', first > last)
+    call cells_between(0.0_wp, 2.0_wp, first(1), last(1))      ! from plane to plane
+    call cells_between(2.0_wp, 2.0_wp, first(2), last(2))      ! a point on a plane
+    call centres_between(1.5_wp, 3.5_wp, first(3), last(3))
+    call centres_between(3.4_wp, 1.6_wp, first(4), last(4))    ! in any order
+    call centres_between(1.6_wp, 2.4_wp, first(5), last(5))    ! none
+    call check('from the first', all(first(:4) == [1, 3, 2, 3]))
+    call check('to the last', all(last(:4) == [2, 3, 3, 3]))
+    call check('no centre between', first(5) > last(5))
   end subroutine ranges
 
   !> Neighbours share edges, so a point on one has the same bits whichever end comes first.
@@ -133,8 +127,7 @@ contains
     x(1) = value_on_line(a, b, 1, 0.77_wp, 3)
     call check('on the line', x(1), -0.3_wp + 2.4_wp*0.67_wp/1.2_wp, 1.0e-15_wp)
     call check('the same bits', value_on_line(b, a, 1, 0.77_wp, 3), x(1))
-    call check('a falling coordinate', &
-      value_on_line(a, b, 2, -0.1_wp, 1), value_on_line(b, a, 2, -0.1_wp, 1))
+    call check('falling', value_on_line(a, b, 2, -0.1_wp, 1), value_on_line(b, a, 2, -0.1_wp, 1))
     x = point_at(a(1:2), b(1:2), 1, 0.7_wp)
     call check('half way', x, [0.7_wp, -0.1_wp], 1.0e-15_wp)
   end subroutine the_same_from_either_end

@@ -47,19 +47,16 @@ contains
     call check('not cut', solid%n_cut, 0)
     call clear_cells(solid)
     call clear_faces(grid, solid)
-    call check('nothing is left of it', all(solid%aperture >= 1.0_wp) &
-               .and. all(solid%alpha <= 0.0_wp))
+    call check('nothing left of it', all(solid%aperture >= 1.0_wp) .and. all(solid%alpha <= 0.0_wp))
     call shared_cell(0.6_wp, 0.2_wp)
     call finish_cells(grid, solid)
     call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
 
     call guard_links(voxels, solid)
     links = links_on_grid(solid)
-    call check('the wall is at the centre inside, below', &
-      links%high(c(1), c(2), c(3), 1), 1.0e-3_wp)
+    call check('the wall is at the centre, below', links%high(c(1), c(2), c(3), 1), 1.0e-3_wp)
     call check('and above', links%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp)
-    call check('six links, of the body', solid%n_link == 6 &
-               .and. links%body_low(c(1), c(2), c(3), 2) == 1)
+    call check('six, of the body', solid%n_link == 6 .and. links%body_low(c(1), c(2), c(3), 2) == 1)
     call check('no others', count(links%low < no_hit), 6)
   end subroutine test_finish_solid
 

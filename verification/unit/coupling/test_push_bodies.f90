@@ -59,30 +59,17 @@ contains
   !> Half way between x and y both have the mean of the two, with half their difference between
   !! them; a quarter about x swaps y and z. The inverses belong to them.
   subroutine check_inertia()
-    real(wp) :: want(3, 3)
+    real(wp), parameter :: half = 0.5_wp*(j(1) + j(2)), rest = 0.5_wp*(j(1) - j(2)), &
+      eye(9) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp]
     integer :: b
 
-    want = 0.0_wp
-    want(1, 1) = 0.5_wp*(j(1) + j(2))
-    want(2, 2) = want(1, 1)
-    want(1, 2) = 0.5_wp*(j(1) - j(2))
-    want(2, 1) = want(1, 2)
-    want(3, 3) = j(3)
-    call check('an eighth about z', reshape(bodies%inertia(:, :, 1), [9]), reshape(want, [9]), &
-      1.0e-14_wp*j(1))
-    want = 0.0_wp
-    want(1, 1) = j(1)
-    want(2, 2) = j(3)
-    want(3, 3) = j(2)
-    call check('a quarter about x', reshape(bodies%inertia(:, :, 5), [9]), reshape(want, [9]), &
-      1.0e-14_wp*j(1))
-    want = 0.0_wp
-    do b = 1, 3
-      want(b, b) = 1.0_wp
-    end do
+    call check('an eighth about z', [bodies%inertia(:, :, 1)], [half, rest, 0.0_wp, rest, half, &
+      0.0_wp, 0.0_wp, 0.0_wp, j(3)], 1.0e-14_wp*j(1))
+    call check('a quarter about x', [bodies%inertia(:, :, 5)], &
+      [j(1), 0.0_wp, 0.0_wp, 0.0_wp, j(3), 0.0_wp, 0.0_wp, 0.0_wp, j(2)], 1.0e-14_wp*j(1))
     do b = 1, 5
-      call check('the inverse is one', reshape(matmul(bodies%inertia(:, :, b), &
-        bodies%inverse_inertia(:, :, b)), [9]), reshape(want, [9]), 1.0e-13_wp)
+      call check('the inverse is one', [matmul(bodies%inertia(:, :, b), &
+        bodies%inverse_inertia(:, :, b))], eye, 1.0e-13_wp)
     end do
     call check('mass', bodies%mass, spread(mass, 1, 5), 1.0e-14_wp*mass)
     call check('volume', bodies%volume, spread(product(edge), 1, 5), 1.0e-16_wp)

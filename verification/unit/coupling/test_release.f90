@@ -34,8 +34,7 @@ contains
 
     pending = .false.
     warnings = 0
-    call check('one block at the start', all(blocks%present .eqv. [.true., .false., .false., &
-                                                                   .false.]))
+    call check('one at the start', all(blocks%present .eqv. [.true., .false., .false., .false.]))
     call check('next release', next_release(0.0_wp, blocks), 0.25_wp)
 
     call try(0.0_wp)
@@ -91,8 +90,7 @@ contains
     call check('the others wait', all(waits .eqv. .not. gone))
     row%blocks%x(3, 2:4) = 0.2_wp
     call release_due_blocks(row%walls, 1.1_wp, row%overlap, row%blocks, waits, warnings, released)
-    call check('the long one when they have left', row%blocks%present(1) .and. &
-      .not. row%blocks%present(6))
+    call check('the long one after them', row%blocks%present(1) .and. .not. row%blocks%present(6))
   end subroutine check_together
 
   !> A cube that drops after a second.

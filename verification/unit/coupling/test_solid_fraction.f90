@@ -309,9 +309,8 @@ contains
         call fill()
         do i = 1, 20
           associate (w => solid%aperture, n => solid%link_number)
-            alike = alike .and. [ &
-              all(solid%inside(i, 1:20, 1:20) == solid%inside(21 - i, 1:20, 1:20)), &
-              all(abs(w(i, 1:20, 1:20, 1) - w(22 - i, 1:20, 1:20, 1)) <= 0.0_wp), &
+            alike = alike .and. [all(solid%inside(i, 1:20, 1:20) == solid%inside(21 - &
+              i, 1:20, 1:20)), all(abs(w(i, 1:20, 1:20, 1) - w(22 - i, 1:20, 1:20, 1)) <= 0.0_wp), &
               all((n(i, 1:20, 1:20, 1) > 0) .eqv. (n(22 - i, 1:20, 1:20, 1) > 0))]
           end associate
         end do
@@ -354,9 +353,8 @@ contains
       worst(2) = max(worst(2), largest_gap())
       missing = missing + links_without_hit()
       associate (w => solid%aperture)
-        closed = closed .and. all(solid%alpha(1:16, 1:16, 1:16) < 1 &
-          .or. sum(w(1:16, 1:16, 1:16, :), 4) + w(2:17, 1:16, 1:16, 1) &
-          + w(1:16, 2:17, 1:16, 2) + w(1:16, 1:16, 2:17, 3) <= 0)
+        closed = closed .and. all(solid%alpha(1:16, 1:16, 1:16) < 1 .or. sum(w(1:16, 1:16, 1:16, &
+          :), 4) + w(2:17, 1:16, 1:16, 1) + w(1:16, 2:17, 1:16, 2) + w(1:16, 1:16, 2:17, 3) <= 0)
       end associate
     end do
     ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
@@ -398,10 +396,8 @@ contains
     call put('hexapod', [d], [0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], &
       normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp]))
     call fill()
-    call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
-      1e-7_wp*d**3)
-    call check('three links: the floor is open', minval(solid%aperture(1:60, 1:20, 1, 3)), 1.0_wp, &
-      1e-6_wp)
+    call check('three links: all in the tank', sum(solid%alpha)*grid%volume, 7*d**3, 1e-7_wp*d**3)
+    call check('three links: open floor', minval(solid%aperture(1:60, 1:20, 1, 3)), 1.0_wp, 1e-6_wp)
     call check('three links: no pockets', solid%n_sealed, 0)
   end subroutine three_links_on_the_floor
 
@@ -486,8 +482,7 @@ contains
     call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp)
     call check('half outside: solid share of the side', &
       sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
-    call check('half outside: faces end at the side', &
-      maxval(solid%face(3, 1:solid%body_face(2) - 1)), 11)
+    call check('half outside: faces end', maxval(solid%face(3, 1:solid%body_face(2) - 1)), 11)
     call check('half outside: so do cells', maxval(solid%cell(3, 1:solid%body_cell(2) - 1)), 10)
     call check('half outside: no link beyond the side', all(solid%link_number(:, :, 11:, 3) == 0))
     blocks%x(3, 1) = 0.049_wp - 0.01_wp   ! its top 1 mm below the side
@@ -578,9 +573,9 @@ contains
   end subroutine periods
 
   !> Share of cut cell m by its list of tetrahedra.
-  function volume_of_tets(m) result(share)
+  real(wp) function volume_of_tets(m) result(share)
     integer, intent(in) :: m
-    real(wp) :: share, v, moment(3), low(3)
+    real(wp) :: v, moment(3), low(3)
     type(polyhedron_t) :: p
     integer :: t
 
@@ -595,9 +590,8 @@ contains
   end function volume_of_tets
 
   !> Equal bits in all arrays over cells.
-  function same_bits(a, b) result(same)
+  logical function same_bits(a, b) result(same)
     type(solid_geometry_t), intent(in) :: a, b
-    logical :: same
     type(links_t) :: of_a, of_b
 
     of_a = links_on_grid(a)

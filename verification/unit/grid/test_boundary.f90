@@ -88,10 +88,9 @@ contains
   end subroutine all_halos
 
   !> Largest error of the face velocity where a side gives it; elsewhere it must be untouched.
-  pure function side_errors(grid, uf) result(worst)
+  pure real(wp) function side_errors(grid, uf) result(worst)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: uf(1 - n_halo:, 1 - n_halo:, 1 - n_halo:, :)
-    real(wp) :: worst
     real(wp) :: expected
     integer :: i, j, k, d, s, at(3)
 
@@ -116,19 +115,17 @@ contains
   end function side_errors
 
   !> A value that tells the cell and the component, exact in any order of summing.
-  pure function original(at, c) result(value)
+  pure real(wp) function original(at, c) result(value)
     integer, intent(in) :: at(3), c
-    real(wp) :: value
 
     value = real(c, wp) + 0.125_wp*real(at(1), wp) + 0.0625_wp*real(at(2), wp)**2 &
             - 0.3125_wp*real(at(3), wp)
   end function original
 
   !> Nearest cell of the domain; the image in a periodic direction.
-  pure function expected_scalar(grid, at) result(value)
+  pure real(wp) function expected_scalar(grid, at) result(value)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: at(3)
-    real(wp) :: value
     integer :: from(3)
 
     from = merge(modulo(at - 1, grid%n) + 1, min(max(at, 1), grid%n), grid%periodic)
@@ -136,10 +133,9 @@ contains
   end function expected_scalar
 
   !> The rules of the sides applied one after the other; walls mirror, open sides carry outward.
-  pure function expected_velocity(grid, at, c) result(value)
+  pure real(wp) function expected_velocity(grid, at, c) result(value)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: at(3), c
-    real(wp) :: value
     real(wp) :: factor, shift
     integer :: from(3), d, s, beyond
 

@@ -48,18 +48,14 @@ contains
   subroutine places_of_cells(grid)
     type(grid_t), intent(in) :: grid
 
-    call check('first and last cell are inside', .not. (grid%outside([1, 1, 1]) .or. &
-                                                        grid%outside(cells)))
+    call check('first and last inside', .not. (grid%outside([1, 1, 1]) .or. grid%outside(cells)))
     call check('beyond x, z', all([grid%outside([0, 2, 2]), grid%outside([7, 2, 2]), &
                                    grid%outside([2, 2, 0]), grid%outside([2, 2, 6])]))
-    call check('nothing is beyond a period', .not. (grid%outside([2, 0, 2]) .or. &
-                                                    grid%outside([2, 5, 2])))
-    call check('beyond, by direction', all(grid%beyond([0, 0, 0], [1, 2, 3]) .eqv. &
-                                           [.true., .false., .true.]))
-    call check('beside the lower side', all(grid%beside([1, 1, 1], 1, [1, 2, 3]) .eqv. &
+    call check('none beyond a period', .not. (grid%outside([2, 0, 2]) .or. grid%outside([2, 5, 2])))
+    call check('beyond', all(grid%beyond([0, 0, 0], [1, 2, 3]) .eqv. [.true., .false., .true.]))
+    call check('lower side', all(grid%beside([1, 1, 1], 1, [1, 2, 3]) .eqv. &
                                             [.true., .false., .true.]))
-    call check('beside the upper side', all(grid%beside(cells, 2, [1, 2, 3]) .eqv. &
-                                            [.true., .false., .true.]))
+    call check('upper side', all(grid%beside(cells, 2, [1, 2, 3]) .eqv. [.true., .false., .true.]))
     call check('not beside', .not. any([grid%beside(2, 1, 1), grid%beside(1, 2, 1)]))
     call check('side of the faces in x', all(grid%side_of_face([1, 2, 6, 7], 1) == &
                                              [side_inflow, no_side, no_side, side_outflow]))

@@ -88,8 +88,7 @@ contains
 
     call build(closed, middle, .true.)
     do concurrent (k=1:cells(3), j=1:cells(2), i=1:cells(1))
-      box%flow%p(i, j, k) = 50.0_wp + dot_product(gradient, box%grid%centre([i, j, k], &
-                                                                           [1, 2, 3]))
+      box%flow%p(i, j, k) = 50.0_wp + dot_product(gradient, box%grid%centre([i, j, k], [1, 2, 3]))
     end do
     call force_from_faces(box%grid, box%bodies, flux, box%flow%p, force)
     expected = 0.0_wp

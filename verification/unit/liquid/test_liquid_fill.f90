@@ -93,8 +93,7 @@ contains
       + product([0.06_wp, 0.0021_wp, 0.1487_wp]), 1.0e-17_wp)
     fluid = fluid_t(gravity=[9.81_wp, 0.0_wp, 0.0_wp], water_level=0.1_wp)
     call fill_liquid(grid, fluid, [water_t ::], after, flow)
-    call check('gravity along +x: liquid beyond the level', flow%liquid_initial, &
-               0.06_wp*0.06_wp*0.2_wp, 1.0e-17_wp)
+    call check('gravity along +x: beyond', flow%liquid_initial, 0.06_wp*0.06_wp*0.2_wp, 1.0e-17_wp)
     call check('and dry before it', maxval(flow%liquid(1:10, :, :)), 0.0_wp)
     call fill_liquid(grid, fluid_t(), [water_t ::], after, flow)
     call check('no level, no liquid', flow%liquid_initial, 0.0_wp)
@@ -172,7 +171,7 @@ contains
 
     call still(level)
     call raise_surface(grid, before, block%solid, extension, flow, rest)
-    call check('hexapod appears: volume', liquid_volume(grid, flow%liquid)/flow%liquid_initial, &
+    call check('it appears', liquid_volume(grid, flow%liquid)/flow%liquid_initial, &
                1.0_wp, 1.0e-14_wp)
     call check('hexapod appears: all of it found a place', rest, 0.0_wp)
     call check('hexapod appears: each row has one C^', spread_of_rows(), 0.0_wp, 1.0e-12_wp)

@@ -12,8 +12,7 @@ module test_liquid_sweep_m
   private
   public :: test_liquid_sweep
 
-  real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]
-  real(wp), parameter :: close = 1.0e-14_wp
+  real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp], close = 1.0e-14_wp
   integer, parameter :: layer = 3   !! of the surface
   type(grid_t) :: grid
   type(solid_geometry_t) :: solid
@@ -55,8 +54,7 @@ contains
     call sweep_volumes(grid, solid, 3, volumes, sweeps)
     call check('up: from the surface', volumes%g(2, 2, layer + 1, 3), expected, close)
     call check('up: from below', volumes%g(2, 2, layer, 3), 0.3_wp)
-    call check('up: liquid of the surface', volumes%w(2, 2, layer), share + 0.3_wp - expected, &
-               close)
+    call check('up: of the surface', volumes%w(2, 2, layer), share + 0.3_wp - expected, close)
     call check('up: room', volumes%v(2, 2, layer - 1:layer + 1), [0.7_wp, 1.0_wp, 1.3_wp], close)
     call check('up: nothing is lost', sum(volumes%w(1:4, 1:3, 1:6)), before, 100*close)
     call check('up: before the sweep', volumes%w_before(2, 2, layer), share)
@@ -90,8 +88,7 @@ contains
     call sweep_volumes(grid, solid, 1, volumes, sweeps)
     call check('inflow', volumes%g(1, 2, 1:5, 1), 0.2_wp*[1.0_wp, 1.0_wp, 1.0_wp, 0.7_wp, 0.0_wp], &
                close)
-    call check('back from an outflow', volumes%g(5, 2, 1:4, 1), &
-               -0.2_wp*[1.0_wp, 1.0_wp, 0.4_wp, 0.0_wp], close)
+    call check('outflow', volumes%g(5, 2, 1:4, 1), -0.2_wp*[1.0_wp, 1.0_wp, 0.4_wp, 0.0_wp], close)
     sweeps%incoming = 0.5_wp
     call start_side()
     call check('an open side', volumes%g(2, 2, 7, 3), -0.05_wp, close)

@@ -96,11 +96,11 @@ contains
 
     call transport_liquid(grid, before, after, dt, step, transport, flow)
     associate (a => grid%lo, b => grid%hi)
-      room = max(room, maxval(abs(flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))/grid%volume &
-                   - (1.0_wp - after%alpha(a(1):b(1), a(2):b(2), a(3):b(3))))))
-      bound = max(bound, maxval(-flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)))/grid%volume, &
-                  maxval(flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) &
-                         - flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3)))/grid%volume)
+      associate (fluid => flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))/grid%volume, &
+                 liquid => flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3))/grid%volume)
+        room = max(room, maxval(abs(fluid - 1.0_wp + after%alpha(a(1):b(1), a(2):b(2), a(3):b(3)))))
+        bound = max(bound, maxval(-liquid), maxval(liquid - fluid))
+      end associate
     end associate
     drift = max(drift, abs((liquid_volume(grid, flow%liquid) - flow%liquid_inflow) &
                            /flow%liquid_initial - 1.0_wp))
@@ -117,9 +117,8 @@ contains
   end subroutine check_books
 
   !> Liquid that is in one field but not in the other [m3].
-  function misplaced(liquid, other) result(volume)
+  real(wp) function misplaced(liquid, other) result(volume)
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: liquid, other
-    real(wp) :: volume
 
     associate (a => grid%lo, b => grid%hi)
       volume = 0.5_wp*sum(abs(liquid(a(1):b(1), a(2):b(2), a(3):b(3)) &
@@ -169,24 +168,13 @@ contains
   end subroutine one_turn
 
   !> Share of a ball of radius 0.06 m in the middle, by points.
-  pure function ball_share(at) result(share)
+  pure real(wp) function ball_share(at) result(share)
     integer, intent(in) :: at(3)
-    real(wp) :: share
     integer, parameter :: n = 8
-    integer :: i, j, k, hits
-    real(wp) :: x(3)
+    integer :: m
 
-    hits = 0
-    do k = 1, n
-      do j = 1, n
-        do i = 1, n
-          x = (real([i, j, k], wp) - 0.5_wp)/real(n, wp)
-          x = grid%face(at, [1, 2, 3]) + grid%h*x - 0.5_wp*grid%length
-          if (sum(x*x) < 0.06_wp**2) hits = hits + 1
-        end do
-      end do
-    end do
-    share = real(hits, wp)/real(n**3, wp)
+    share = count([(sum((grid%face(at, [1, 2, 3]) - 0.5_wp*grid%length + grid%h*(modulo(m/[1, n, &
+      n**2], n) + 0.5_wp)/n)**2) < 0.06_wp**2, m=0, n**3 - 1)])/real(n**3, wp)
   end function ball_share
 
   !> A block of liquid in solid rotation about the y axis.
@@ -205,9 +193,8 @@ contains
   end subroutine column_in_rotation
 
   !> Stream function of one turn per second about the middle, at rest outside a circle.
-  pure function stream(x) result(psi)
+  pure real(wp) function stream(x) result(psi)
     real(wp), intent(in) :: x(2)   !! x and z [m]
-    real(wp) :: psi
 
     psi = pi*min(sum((x - 0.16_wp)**2), 0.15_wp**2)
   end function stream

@@ -23,8 +23,7 @@ contains
   !> Direction number i of a spiral over the sphere, with every fifth one degenerate.
   function direction(i) result(n)
     integer, intent(in) :: i
-    real(wp) :: n(3)
-    real(wp) :: z, angle
+    real(wp) :: n(3), z, angle
 
     z = 2.0_wp*modulo(real(i, wp)*0.754877666_wp, 1.0_wp) - 1.0_wp
     angle = 2.0_wp*pi*modulo(real(i, wp)*0.569840291_wp, 1.0_wp)
@@ -47,10 +46,10 @@ contains
       do k = 0, 8
         f = 0.125_wp*real(k, wp)
         if (k == 4) f = modulo(real(i, wp)*0.381966011_wp, 1.0_wp)
-        d = plane_constant(n, f, h)
+        d = unit_constant(n*h, f)
         worst = max(worst, abs(volume_below(n, d, h)/product(h) - f))
         f = 10.0_wp**(-k - 2)
-        d = plane_constant(n, f, h)
+        d = unit_constant(n*h, f)
         worst_small = max(worst_small, abs(volume_below(n, d, h)/product(h) - f))
         bound = max(bound, volume_below(n, d, h)/product(h) - 1.0_wp, -volume_below(n, d, h))
       end do
@@ -66,12 +65,11 @@ contains
     third = 1.0_wp/3.0_wp
     call check('plane through three corners', unit_volume([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp), &
                1.0_wp/6.0_wp, 1.0e-15_wp)
-    call check('plane through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), &
+    call check('through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), &
                0.5_wp, 1.0e-15_wp)
     call check('hexagon', unit_volume([third, third, third], 0.4_wp), &
                (1.2_wp**3 - 3.0_wp*0.2_wp**3)/6.0_wp, 1.0e-15_wp)
-    call check('plane parallel to a face', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), &
-               0.75_wp, 1.0e-15_wp)
+    call check('flat', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), 0.75_wp, 1.0e-15_wp)
     call check('wedge', unit_volume([0.25_wp, 0.75_wp, 0.0_wp], 0.5_wp), 0.5_wp, 1.0e-15_wp)
     call check('box of edges 1, 2, 3', volume_below([1.0_wp, 1.0_wp, 1.0_wp], &
       1.0_wp, [1.0_wp, 2.0_wp, 3.0_wp]), 1.0_wp/6.0_wp, 1.0e-15_wp)
@@ -114,7 +112,7 @@ contains
 
   subroutine slabs_add_up()
     integer :: i, d
-    real(wp) :: m(3), f, a, t, worst, low, high, h(3), n(3)
+    real(wp) :: m(3), f, a, t, worst, low, high
 
     worst = 0.0_wp
     do i = 1, 3000
@@ -130,14 +128,12 @@ contains
       end do
     end do
     call check('two slabs make the cell', worst, 0.0_wp, 1.0e-14_wp)
-    h = [1.0_wp, 2.0_wp, 4.0_wp]
-    n = [0.0_wp, 0.0_wp, 1.0_wp]
-    call check('slab beside the lower face is under water', &
-               liquid_in_slab(n, 1.0_wp, h, 3, 1, 0.5_wp), 1.0_wp, 1.0e-15_wp)
-    call check('slab beside the upper face is dry', liquid_in_slab(n, 1.0_wp, h, 3, 2, 0.5_wp), &
-               0.0_wp, 1.0e-15_wp)
-    call check('slab across is a quarter full', liquid_in_slab(n, 1.0_wp, h, 1, 2, 0.5_wp), &
-               1.0_wp, 1.0e-15_wp)
+    m = [0.0_wp, 0.0_wp, 4.0_wp]   ! normal along z times the edges 1, 2, 4 of a cell of volume 8
+    call check('slab at the lower face is under water', 8*unit_slab(m, 1.0_wp, 3, 1, 0.125_wp), &
+      1.0_wp, 1.0e-15_wp)
+    call check('slab at the upper face is dry', 8*unit_slab(m, 1.0_wp, 3, 2, 0.125_wp), 0.0_wp, &
+      1.0e-15_wp)
+    call check('slab across', 8*unit_slab(m, 1.0_wp, 1, 2, 0.5_wp), 1.0_wp, 1.0e-15_wp)
   end subroutine slabs_add_up
 
   !> Shares of the 27 cells below the plane n.x = d; the centre cell is 0..1 in each direction.
@@ -195,59 +191,19 @@ contains
     integer, intent(in) :: at(3)
     real(wp) :: c(3, 3, 3)
     integer, parameter :: n = 12
-    integer :: i, j, k, p, q, r, inside
-    real(wp) :: x(3)
+    integer :: i, j, k, m
 
-    do k = 1, 3
-      do j = 1, 3
-        do i = 1, 3
-          inside = 0
-          do r = 1, n
-            do q = 1, n
-              do p = 1, n
-                x = real(at + [i, j, k] - 2, wp) + (real([p, q, r], wp) - 0.5_wp)/real(n, wp)
-                if (sum(x*x) < radius**2) inside = inside + 1
-              end do
-            end do
-          end do
-          c(i, j, k) = real(inside, wp)/real(n**3, wp)
-        end do
-      end do
+    do concurrent (k=1:3, j=1:3, i=1:3)
+      c(i, j, k) = count([(norm2(at + [i, j, k] - 2 + (modulo(m/[1, n, n**2], n) + 0.5_wp)/n) &
+        < radius, m=0, n**3 - 1)])/real(n**3, wp)
     end do
   end function sphere_shares
 
-  !> Constant d of the plane `normal.x = d` that cuts the share `fraction` off the box (0,0,0)..h
-  !! [m].
-  pure function plane_constant(normal, fraction, h) result(d)
-    real(wp), intent(in) :: normal(3)   !! from liquid to gas
-    real(wp), intent(in) :: fraction    !! liquid share, 0..1 [-]
-    real(wp), intent(in) :: h(3)        !! edges of the cell [m]
-    real(wp) :: d
-
-    d = unit_constant(normal*h, fraction)
-  end function plane_constant
-
   !> Volume of the box (0,0,0)..h below the plane `normal.x = d` [m3].
-  pure function volume_below(normal, d, h) result(volume)
-    real(wp), intent(in) :: normal(3)
-    real(wp), intent(in) :: d      !! [m]
-    real(wp), intent(in) :: h(3)   !! [m]
-    real(wp) :: volume
+  pure real(wp) function volume_below(normal, d, h) result(volume)
+    real(wp), intent(in) :: normal(3), d, h(3)   !! [-], [m], [m]
 
-    volume = unit_volume(normal*h, d)*(h(1)*h(2)*h(3))
+    volume = unit_volume(normal*h, d)*product(h)
   end function volume_below
-
-  !> Liquid in the slab of given thickness beside the lower (side 1) or upper (side 2) face [m3].
-  pure function liquid_in_slab(normal, d, h, direction, side, thickness) result(volume)
-    real(wp), intent(in) :: normal(3)
-    real(wp), intent(in) :: d          !! [m]
-    real(wp), intent(in) :: h(3)       !! [m]
-    integer, intent(in) :: direction   !! of the normal of the face
-    integer, intent(in) :: side
-    real(wp), intent(in) :: thickness  !! 0..h(direction) [m]
-    real(wp) :: volume
-
-    volume = unit_slab(normal*h, d, direction, side, thickness/h(direction))*(h(1)*h(2)*h(3))
-  end function liquid_in_slab
 
 end module test_plic_m

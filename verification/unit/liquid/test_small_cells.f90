@@ -47,8 +47,7 @@ contains
   subroutine who_is_small()
     call find_small_cells(grid, solid, volumes, small)
     call check('small cells', small%n, 3)
-    call check('two of a row hold nothing', small%number(3, 2, 2) > 0 .and. &
-               small%number(4, 2, 2) > 0)
+    call check('two of a row are empty', small%number(3, 2, 2) > 0 .and. small%number(4, 2, 2) > 0)
     call check('one gives nearly all', small%number(2, 3, 3) > 0)
     call check('one gives just what it may', small%number(4, 1, 1), 0)
     call check('implicit faces', small%n_implicit, 3)
@@ -76,8 +75,7 @@ contains
     volumes%c = -1.0_wp
     call renew_shares(grid, solid, small, volumes)
     call check('new share of who gave', volumes%c(3, 2, 2), c_3, 1.0e-9_wp)
-    call check('new share of who got', volumes%c(5, 2, 2), through*c_4/(1.0_wp + through), &
-               1.0e-12_wp)
+    call check('share of who got', volumes%c(5, 2, 2), through*c_4/(1.0_wp + through), 1.0e-12_wp)
     call check('no other', volumes%c(6, 2, 2), -1.0_wp)
   end subroutine row_of_small_cells
 

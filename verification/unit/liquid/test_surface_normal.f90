@@ -91,8 +91,7 @@ contains
     c(7, :, level) = 0.5_wp
     solid%alpha(8, 3, level - 1) = 0.5_wp
     normal = surface_normal(grid, solid, vertical_of(-up), c, 8, 3, level)
-    call check('beside a side: half the slope between the last two', normal(1)/normal(3), 0.1_wp, &
-               1.0e-14_wp)
+    call check('beside a side: half the slope of the last', normal(1)/normal(3), 0.1_wp, 1.0e-14_wp)
   end subroutine sides_of_domain
 
 end module test_surface_normal_m

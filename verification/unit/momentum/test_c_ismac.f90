@@ -168,8 +168,7 @@ contains
       call check('the explicit step changes something', &
                  maxval(abs(predictor%gain(1:n, 1, 1, 2))) > 0.1_wp*courant*grid%volume)
     end do
-    call check('difference to the explicit step', difference(1:2)/difference(2:3), &
-               [4.0_wp, 4.0_wp], 0.05_wp)
+    call check('to the explicit step', difference(1:2)/difference(2:3), [4.0_wp, 4.0_wp], 0.05_wp)
   end subroutine short_steps
 
   !> Where forces balance advection nothing changes, whatever the step.
@@ -234,9 +233,7 @@ contains
     real(wp) :: error(3)
     integer :: m
 
-    do m = 1, 3
-      error(m) = wave_error(16*2**m)
-    end do
+    error = [(wave_error(16*2**m), m=1, 3)]
     print '(a, 3es10.2)', 'smooth wave at Courant number 1/4: errors at 32, 64, 128 cells ', error
     call check('order in the step', log(error(2)/error(3))/log(2.0_wp), 1.0_wp, 0.1_wp)
     ! The leading error is a diffusivity (a - 1/2) u^2 dt; over half a period it takes
@@ -246,22 +243,18 @@ contains
   end subroutine order_of_accuracy
 
   !> Mean error of a sine wave after half a period at a Courant number of 1/4.
-  function wave_error(n) result(error)
+  real(wp) function wave_error(n) result(error)
     integer, intent(in) :: n
-    real(wp) :: error
-    integer :: i, it
+    real(wp) :: sine(n)
+    integer :: i
 
     call start([n, 1, 1], 1, 'tvd5')
-    do i = 1, n
-      flow%u(i, :, :, 2) = sin(2.0_wp*pi*(real(i, wp) - 0.5_wp)/n)
-    end do
-    do it = 1, 2*n
+    sine = [(sin(2.0_wp*pi*(i - 0.5_wp)/n), i=1, n)]
+    flow%u(1:n, 1, 1, 2) = sine
+    do i = 1, 2*n
       call step(0.25_wp, 1)
     end do
-    error = 0.0_wp
-    do i = 1, n
-      error = error + abs(flow%u(i, 1, 1, 2) + sin(2.0_wp*pi*(real(i, wp) - 0.5_wp)/n))/real(n, wp)
-    end do
+    error = sum(abs(flow%u(1:n, 1, 1, 2) + sine))/n
   end function wave_error
 
   !> Without advection the predictor is the viscous stage, with a free body, wall links and small
@@ -297,7 +290,7 @@ contains
     call check('with a body: velocity', &
       block%flow%u(1:12, 1:12, 1:12, :) - u_expected(1:12, 1:12, 1:12, :), 0.0_wp, 1.0e-7_wp)
     call check('with a body: motion', block%bodies%motion - bodies%motion, 0.0_wp, 1.0e-6_wp)
-    call check('with a body: force', viscous%force(:, 1), expected(:, 1), &
+    call check('body: force', viscous%force(:, 1), expected(:, 1), &
                1.0e-6_wp*norm2(expected(1:3, 1)))
     call check('with a body: it is dragged', norm2(bodies%motion(:, 1) - [0.3_wp, -0.2_wp, 0.1_wp, &
       2.0_wp, 1.0_wp, -3.0_wp]) > 0.1_wp)

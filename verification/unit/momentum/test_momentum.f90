@@ -102,19 +102,17 @@ contains
   end subroutine vortex
 
   !> Stream function of the vortex at a corner of cell (i, k) [m2/s].
-  pure function psi(speed, i, k) result(value)
+  pure real(wp) function psi(speed, i, k) result(value)
     real(wp), intent(in) :: speed   !! [m/s]
     integer, intent(in) :: i, k
-    real(wp) :: value
 
     value = speed*grid%length(1)/pi*sin(pi*real(i - 1, wp)/real(grid%n(1), wp)) &
             *sin(pi*real(k - 1, wp)/real(grid%n(3), wp))
   end function psi
 
   !> Largest change of a velocity that was uniform, in cells that hold more than the given share.
-  function deviation(min_volume) result(worst)
+  real(wp) function deviation(min_volume) result(worst)
     real(wp), intent(in) :: min_volume   !! [V]
-    real(wp) :: worst
     integer :: d
 
     worst = 0.0_wp
@@ -142,8 +140,7 @@ contains
       call carry(2.5e-3_wp*real(subcycles, wp), step, subcycles)
     end do
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
-    call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
-               > 50)
+    call check('an interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) > 50)
     call check('subcycles keep cells from being small', transport%small%n_implicit, 0)
   end subroutine uniform_through_an_interface
 
@@ -156,8 +153,7 @@ contains
       [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], nothing, nothing)
     call vortex(0.2_wp, stream)
     do concurrent (k=1:12, j=1:8, i=1:16)
-      flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), &
-                            cos(0.4_wp*i*j)]
+      flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), cos(0.4_wp*i*j)]
     end do
     call fill_velocity_halo(grid, flow%u)
     before = total_momentum()
@@ -182,8 +178,7 @@ contains
     end associate
   end function total_momentum
 
-  function total_mass() result(m)
-    real(wp) :: m
+  real(wp) function total_mass() result(m)
 
     associate (n => grid%n)
       m = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
@@ -241,10 +236,9 @@ contains
   end subroutine order_of_accuracy
 
   !> Mean error of a sine wave after half a period at a given Courant number.
-  function wave_error(n, courant) result(error)
+  real(wp) function wave_error(n, courant) result(error)
     integer, intent(in) :: n
     real(wp), intent(in) :: courant
-    real(wp) :: error
     real(wp) :: nothing(3, 0), dt, exact(n)
     integer :: i, step, steps
 
@@ -290,9 +284,8 @@ contains
   end subroutine donor_value
 
   !> Mean of a sine over the cell above face x.
-  pure function wave(x) result(value)
+  pure real(wp) function wave(x) result(value)
     real(wp), intent(in) :: x   !! [m]
-    real(wp) :: value
 
     value = (cos(2.0_wp*pi*x) - cos(2.0_wp*pi*(x + grid%h(1))))/(2.0_wp*pi*grid%h(1))
   end function wave

@@ -49,10 +49,9 @@ contains
   end subroutine test_tvd
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
-  function face_value(scheme, q) result(value)
+  real(wp) function face_value(scheme, q) result(value)
     integer, intent(in) :: scheme   !! `mp_scheme` | `tvd_scheme`
     real(wp), intent(in) :: q(-2:2)
-    real(wp) :: value
     type(grid_t) :: grid
     real(wp) :: flux(-2:4, 1, 1), u(-2:4, 1, 1), face(2)
 
@@ -91,8 +90,7 @@ contains
         error(level) = max(error(level), abs(value - exact))
       end do
     end do
-    call check('clipped: order over the top of sin(x)', log(error(1)/error(2))/log(2.0_wp), &
-               5.0_wp, 0.15_wp)
+    call check('clipped: order over sin(x)', log(error(1)/error(2))/log(2.0_wp), 5.0_wp, 0.15_wp)
 
     monotone = .true.
     do c = 1, 3
@@ -113,17 +111,15 @@ contains
   end subroutine clipped
 
   !> Mean of sin over the cell that ends at i/n.
-  pure function wave(i) result(m)
+  pure real(wp) function wave(i) result(m)
     integer, intent(in) :: i
-    real(wp) :: m
 
     m = real(n, wp)*(cos(real(i - 1, wp)/real(n, wp)) - cos(real(i, wp)/real(n, wp)))
   end function wave
 
   !> Mean of exp over the cell that ends at i/n.
-  pure function mean(i) result(m)
+  pure real(wp) function mean(i) result(m)
     integer, intent(in) :: i
-    real(wp) :: m
 
     m = real(n, wp)*(exp(real(i, wp)/real(n, wp)) - exp(real(i - 1, wp)/real(n, wp)))
   end function mean

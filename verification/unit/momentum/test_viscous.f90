@@ -142,8 +142,7 @@ contains
     call solve(5.0_wp)
     momentum(2) = fluid_momentum() + tank%bodies%mass(1)*tank%bodies%motion(1, 1) &
                   + 5.0_wp*sum(2.0_wp*mu*8.0_wp*tank%flow%u(1:4, 1:4, 8, 1))/16.0_wp
-    call check('momentum of body, fluid and tank wall', momentum(2), momentum(1), &
-               1.0e-7_wp*momentum(1))
+    call check('momentum of body, fluid and wall', momentum(2), momentum(1), 1.0e-7_wp*momentum(1))
     call check('the body slows by the force it feels', tank%bodies%mass(1)*(tank%bodies%motion(1, &
       1) - speed), 5.0_wp*viscous%force(1, 1), 1.0e-7_wp*momentum(1))
   end subroutine free_body
@@ -153,8 +152,7 @@ contains
   subroutine few_sweeps()
     call make_wall(heights(2), free=.true.)
     call solve(1.0e4_wp)
-    call check('links to other cells beside the rest', viscous%spread > 0.5_wp &
-               .and. viscous%spread < 0.95_wp)
+    call check('links beside the rest', viscous%spread > 0.5_wp .and. viscous%spread < 0.95_wp)
     call check('sweeps as the bound promises', viscous%iterations > 10 .and. viscous%iterations &
       <= 0.7_wp*log(1.0e-9_wp)/log(viscous%spread/(1.0_wp + sqrt(1.0_wp - viscous%spread**2))))
     momentum = [tank%bodies%motion(1, 1), tank%flow%u(2, 3, 4, 1)]
@@ -274,8 +272,7 @@ contains
   end subroutine waves_in_odd_box
 
   !> Momentum of the unknowns along x [kg m/s].
-  function fluid_momentum() result(p)
-    real(wp) :: p
+  real(wp) function fluid_momentum() result(p)
     integer :: k
 
     p = 0.0_wp

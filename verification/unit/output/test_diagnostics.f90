@@ -101,8 +101,7 @@ contains
       call look()
       expected = 0.5_wp*g*area*(case%fluid%liquid_density*depth**2 &
                                 + case%fluid%gas_density*(1.0_wp - depth**2))
-      call check('potential energy of level liquid', of('potential_energy_fluid'), expected, &
-                 1.0e-12_wp*expected)
+      call check('of level liquid', of('potential_energy_fluid'), expected, 1.0e-12_wp*expected)
       call check('and of its level', energy_of_level(case%fluid, state%grid, state%flow%c), &
                  expected, 1.0e-12_wp*expected)
     end do
@@ -110,8 +109,7 @@ contains
     state%solid%alpha(2, 2, 1) = 0.5_wp
     state%flow%liquid(2, 2, 1) = 0.5_wp*volume
     call look()
-    call check('less what a block displaces', of('potential_energy_fluid'), expected, &
-               1.0e-12_wp*expected)
+    call check('less the displaced', of('potential_energy_fluid'), expected, 1.0e-12_wp*expected)
   end subroutine potential
 
 end module test_diagnostics_m

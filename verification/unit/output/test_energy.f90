@@ -46,8 +46,7 @@ contains
     v = v + dt*g
     call check('a push is found', book%excess, &
                0.5_wp*m*(v**2 - (v + 1.0_wp)**2) - 0.5_wp*m*g*dt*1.0_wp, 1.0e-10_wp)
-    call check('over what was set free', energy_excess(book), book%excess/(m*g*(2.0_wp - z)), &
-               tolerance)
+    call check('over that set free', energy_excess(book), book%excess/(m*g*(2.0_wp - z)), tolerance)
   end subroutine falling_liquid
 
   !> What a release brings is put in; what dissipates is not missed.

@@ -313,8 +313,7 @@ contains
     call remove(path)
     call file%create(path, .false.)
     call file%read('/series/time', x)
-    call check('a missing dataset is named', file%info /= 0 .and. index(file%message, &
-      '/series/time') > 0)
+    call check('none is named', file%info /= 0 .and. index(file%message, '/series/time') > 0)
     call file%close()
   end subroutine test_trouble
 

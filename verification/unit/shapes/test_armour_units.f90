@@ -69,10 +69,8 @@ contains
     associate (shank => pack(s%point(3, :), abs(s%point(1, :)) < 0.18_wp + 1.0e-12_wp))
       call check('dolos: waist', maxval(shank) - minval(shank), 0.32_wp, 1.0e-15_wp)
     end associate
-    call check('dolos: area of a tip', area_above(s, 0.5_wp), 2*(sqrt(2.0_wp) - 1)*0.2_wp**2, &
-      1.0e-15_wp)
-    call check('dolos: a fluke for the other', is_kept(s, quaternion_from_axis([0.0_wp, 1.0_wp, &
-      1.0_wp], pi)))
+    call check('dolos: its tip', area_above(s, 0.5_wp), 2*(sqrt(2.0_wp) - 1)*0.2_wp**2, 1.0e-15_wp)
+    call check('dolos: its flukes', is_kept(s, quaternion_from_axis([0.0_wp, 1.0_wp, 1.0_wp], pi)))
     call check('dolos: its mirror image', is_found(s, s%point*spread([1.0_wp, 1.0_wp, -1.0_wp], 2, &
       size(s%point, 2))))
     call check_net('dolos', s%point, s%facet, s%facet_point, 2)
@@ -85,8 +83,7 @@ contains
 
     call build_cylinder(2.0_wp, 3.0_wp, refinement, s)
     call check('cylinder: ends', area_above(s, 1.5_wp), pi, 1.0e-13_wp)
-    call check('cylinder: a side for the next', is_kept(s, quaternion_from_axis(z, &
-      pi/(3*refinement))))
+    call check('cylinder: side for side', is_kept(s, quaternion_from_axis(z, pi/(3*refinement))))
     call check_net('cylinder', s%point, s%facet, s%facet_point, 2)
     call check('cylinder: faces', size(s%facet) - 1, 2 + 6*refinement)
   end subroutine check_cylinder
@@ -99,10 +96,9 @@ contains
   end function highest
 
   !> Area of the facet that lies at a height.
-  pure function area_above(s, height) result(area)
+  pure real(wp) function area_above(s, height) result(area)
     type(shape_t), intent(in) :: s
     real(wp), intent(in) :: height
-    real(wp) :: area
     real(wp) :: twice(3)
     integer :: f, k, m
 

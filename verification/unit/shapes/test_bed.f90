@@ -391,7 +391,7 @@ contains
     call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
     call find_surface_points(walls, blocks, 0.0_wp, contact, points)
     call check('an edge on a saddle touches it', points%n > 0)
-    call check('as deep as it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
+    call check('how deep it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
       1.0e-12_wp)
   end subroutine edge_on_saddle
 

@@ -42,10 +42,8 @@ contains
     call bed_of(reshape([-1.0_wp, -1.0_wp, -0.5_wp, 3.0_wp, -1.0_wp, 1.5_wp, 3.0_wp, 2.0_wp, &
       1.5_wp, -1.0_wp, 2.0_wp, -0.5_wp], [3, 4]), reshape([1, 2, 3, 1, 3, 4], [3, 2]), bed)
     call check('whole slope', bed_volume(bed, low, [2.0_wp, 1.0_wp, 1.0_wp]), 1.0_wp, 1.0e-14_wp)
-    call check('below half its height', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.5_wp]), &
-      0.75_wp, 1.0e-14_wp)
-    call check('below the floor', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.0_wp]), 0.0_wp, &
-      1.0e-14_wp)
+    call check('below half', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.5_wp]), 0.75_wp, 1.0e-14_wp)
+    call check('at the floor', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.0_wp]), 0.0_wp, 1.0e-14_wp)
   end subroutine slope
 
   !> A box of 1 x 0.5 x 0.2 m that floats 0.3 m above the floor.
@@ -62,8 +60,7 @@ contains
         0.3_wp + 0.05_wp*iand(i, 4)]
     end do
     call bed_of(corner, side, bed)
-    call check('box below the level', bed_volume(bed, low, [2.0_wp, 1.0_wp, 1.0_wp]), 0.1_wp, &
-      1.0e-14_wp)
+    call check('whole box', bed_volume(bed, low, [2.0_wp, 1.0_wp, 1.0_wp]), 0.1_wp, 1.0e-14_wp)
     call check('half of it', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.4_wp]), 0.05_wp, 1.0e-14_wp)
     call check('none of it', bed_volume(bed, low, [2.0_wp, 1.0_wp, 0.2_wp]), 0.0_wp, 1.0e-14_wp)
   end subroutine floating_box

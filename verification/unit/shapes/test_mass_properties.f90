@@ -100,7 +100,7 @@ contains
       error(r) = s%inertia(1, 1)/want - 1
     end do
     call check('sphere: inertia within 0.1 per cent', abs(error(2)) < 1e-3_wp)
-    call check('sphere: fourth order, since the volume is right', abs(error(1)/error(2) - 16) < 2)
+    call check('sphere: fourth order, as the volume is right', error(1)/error(2), 16.0_wp, 2.0_wp)
   end subroutine sphere
 
   !> A shifted mesh: centroid follows, inertia by the parallel axes.
@@ -119,8 +119,7 @@ contains
       want(i, j) = s%inertia(i, j) - rho*s%volume*shift(i)*shift(j)
       if (i == j) want(i, j) = want(i, j) + rho*s%volume*sum(shift**2)
     end do
-    call check('moved block: parallel axes', flat(inertia_about_origin(point, s%tet, rho)), &
-               flat(want), 1e-18_wp)
+    call check('parallel axes', flat(inertia_about_origin(point, s%tet, rho)), flat(want), 1e-18_wp)
   end subroutine moved_block
 
   !> Volumes against closed forms; volume and inertia of every form against integrals over facets.
@@ -186,18 +185,15 @@ contains
       call check('tetrapod: inertia the same about every axis', flat(s%inertia), &
                  flat(diagonal([j, j, j])), 1e-13_wp*j)
     end do
-    call check('tetrapod: volume too large by', away, &
-               [3.770e-3_wp, 4.36e-4_wp, 1.58e-4_wp, 8.2e-5_wp], 1e-6_wp)
+    call check('tetrapod: excess', away, [3.770e-3_wp, 4.36e-4_wp, 1.58e-4_wp, 8.2e-5_wp], 1e-6_wp)
     call check('tetrapod: at least second order in the refinement', away(2)/away(4) > 4)
   end subroutine tetrapod
 
   !> Volume of a tetrapod of unit height with round legs. The hull of the roots by the divergence
   !! theorem: four discs, four triangles, twelve strips of straight lines between mirrored points.
-  function round_tetrapod() result(volume)
-    real(wp) :: volume
+  real(wp) function round_tetrapod() result(volume)
     real(wp), parameter :: e = 0.235_wp, b = 0.151_wp
-    real(wp) :: s, length, p(3), q(3), dp(3), middle(3, 3), strip, phi
-    real(wp) :: axis(3, 3), u(3), v(3)
+    real(wp) :: s, length, p(3), q(3), dp(3), middle(3, 3), strip, phi, axis(3, 3), u(3), v(3)
     integer :: i
     integer, parameter :: n = 2000   ! even
 
@@ -231,9 +227,8 @@ contains
   end function round_tetrapod
 
   !> Integral over the line from p to q of x . (x_phi cross x_t), x = p + t (q - p).
-  pure function strip_height(p, q, dp) result(f)
+  pure real(wp) function strip_height(p, q, dp) result(f)
     real(wp), intent(in) :: p(3), q(3), dp(3)
-    real(wp) :: f
     real(wp) :: dq(3)
 
     dq = [dp(1), -dp(3), -dp(2)]
@@ -241,9 +236,8 @@ contains
     f = determinant(reshape([p, 0.5_wp*(dp + dq), q - p], [3, 3]))
   end function strip_height
 
-  pure function determinant(a) result(d)
+  pure real(wp) function determinant(a) result(d)
     real(wp), intent(in) :: a(3, 3)
-    real(wp) :: d
 
     d = a(1, 1)*(a(2, 2)*a(3, 3) - a(3, 2)*a(2, 3)) + a(2, 1)*(a(3, 2)*a(1, 3) - a(1, 2)*a(3, 3)) &
       + a(3, 1)*(a(1, 2)*a(2, 3) - a(2, 2)*a(1, 3))

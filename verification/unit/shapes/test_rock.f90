@@ -102,19 +102,17 @@ contains
     end do
     call check('no stone below the least', minval(mass) >= mass_min)
     if (mass_max > 0.0_wp) call check('none above the largest', maxval(mass) <= mass_max)
-    call check('the family has the grade', distance_from_grade(input, mass), 0.0_wp, &
-      1.0_wp/real(n, wp))
-    call check('in random order', distance_from_grade(input, mass(:n/2)), 0.0_wp, &
+    call check('family of the grade', distance_from_grade(input, mass), 0.0_wp, 1.0_wp/real(n, wp))
+    call check('random order', distance_from_grade(input, mass(:n/2)), 0.0_wp, &
       1.36_wp/sqrt(0.5_wp*n))
     call check('neighbours are independent', abs(correlation(mass(2:), mass(:n - 1))) < 0.1_wp)
   end subroutine check_grade
 
   !> Largest distance between the share of masses below a mass and that of Rosin and Rammler,
   !! 1 - exp(-ln 2 (M/M50)^n), cut at the least and the largest mass.
-  function distance_from_grade(input, mass) result(distance)
+  real(wp) function distance_from_grade(input, mass) result(distance)
     type(shape_input_t), intent(in) :: input
     real(wp), intent(in) :: mass(:)
-    real(wp) :: distance
     real(wp) :: ends(2), y, below
     integer :: k
 
@@ -131,9 +129,8 @@ contains
     end do
   end function distance_from_grade
 
-  pure function correlation(a, b) result(r)
+  pure real(wp) function correlation(a, b) result(r)
     real(wp), intent(in) :: a(:), b(:)
-    real(wp) :: r
     real(wp) :: mean(2)
 
     mean = [sum(a), sum(b)]/size(a)
@@ -155,8 +152,7 @@ contains
     call check('first corner', s%point(:, 1), [2.2296317314697556e-2_wp, &
       -2.0361615701992319e-3_wp, -1.7718669460058102e-2_wp], 1.0e-12_wp)
     input%seed = 8
-    call check('another seed, another mass', abs(rock_mass(input, 3) &
-      - s%density*s%volume) > 1e-6_wp)
+    call check('another seed and mass', abs(rock_mass(input, 3) - s%density*s%volume) > 1e-6_wp)
   end subroutine check_same_everywhere
 
   subroutine check_refusals()

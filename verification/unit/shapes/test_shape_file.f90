@@ -60,8 +60,7 @@ contains
       call check(kind//': volume', found%volume, built%volume, 1e-13_wp*built%volume)
       call check(kind//': inertia', reshape(found%inertia, [9]), reshape(built%inertia, [9]), &
                  1e-12_wp*maxval(built%inertia))
-      call check(kind//': axes of the file', &
-        maxval(found%point, 2) - maxval(built%point, 2), 0.0_wp, 1e-15_wp)
+      call check(kind//': axes', maxval(found%point, 2) - maxval(built%point, 2), 0.0_wp, 1e-15_wp)
       call check(kind//': tetrahedra', size(found%tet, 2), size(built%tet, 2))
       call check(kind//': surface', size(found%triangle, 2), size(built%triangle, 2))
       n = facets

@@ -118,8 +118,7 @@ contains
 
   !> The surface of cubes, a square for each free side or two triangles.
   subroutine make_net(full, triangles, net)
-    logical, intent(in) :: full(n, n, n)
-    logical, intent(in) :: triangles
+    logical, intent(in) :: full(n, n, n), triangles
     type(net_t), intent(out) :: net
     integer :: i, j, k, d, s, c(4)
 
@@ -157,8 +156,7 @@ contains
   !> Corners of a side of a cube, counter-clockwise from outside.
   pure function side(cube, d, s) result(c)
     integer, intent(in) :: cube(3), d, s   !! direction; 0: lower, 1: upper side
-    integer :: c(4)
-    integer :: corner(3), e, f
+    integer :: c(4), corner(3), e, f
 
     corner = cube - 1 + s*unit(d)
     e = 1 + modulo(d, 3)

@@ -122,15 +122,12 @@ contains
       multigrid = system%multigrid
       call solve(method, multigrid, 0.0_wp, 0.0_wp, 0, system)
       small = 1.0e-5_wp*report%residual
-      call check('no iteration allowed', ended(not_converged, 0) &
-        .and. all(abs(system%x) <= 0))
+      call check('no iteration allowed', ended(not_converged, 0) .and. all(abs(system%x) <= 0))
       call solve(method, multigrid, 0.0_wp, 0.0_wp, 2, system)
       call check('stopped by the limit', ended(not_converged, 2))
       call solve(method, multigrid, small, 0.0_wp, 100, system)
-      call check('goes on from a first guess', report%info == solved &
-        .and. report%residual <= small)
-      call check('the residual is that of the solution', &
-        residual(system) <= 1.01_wp*small*sqrt(720.0_wp))
+      call check('goes on from a first guess', report%info == solved .and. report%residual <= small)
+      call check('the residual of the solution', residual(system) <= 1.01_wp*small*sqrt(720.0_wp))
       call solve(method, multigrid, 1.01_wp*small, 0.0_wp, 100, system)
       call check('nothing left to do', ended(solved, 0))
       system%b = 0.0_wp

@@ -125,11 +125,10 @@ contains
                                           system%grid%lo(3) - 1:)
 
     associate (a => system%grid%lo, b => system%grid%hi, cf => system%op%cf)
-      closed_cells_zero = all(abs(x(a(1):b(1), a(2):b(2), a(3):b(3))) <= 0.0_wp &
-        .or. sum(cf(a(1):b(1), a(2):b(2), a(3):b(3), :), 4) > 0.0_wp &
-        .or. cf(a(1) + 1:b(1) + 1, a(2):b(2), a(3):b(3), 1) > 0.0_wp &
-        .or. cf(a(1):b(1), a(2) + 1:b(2) + 1, a(3):b(3), 2) > 0.0_wp &
-        .or. cf(a(1):b(1), a(2):b(2), a(3) + 1:b(3) + 1, 3) > 0.0_wp)
+      closed_cells_zero = all(abs(x(a(1):b(1), a(2):b(2), a(3):b(3))) &
+        <= 0.0_wp .or. sum(cf(a(1):b(1), a(2):b(2), a(3):b(3), :), 4) > 0.0_wp .or. &
+        cf(a(1) + 1:b(1) + 1, a(2):b(2), a(3):b(3), 1) > 0.0_wp .or. cf(a(1):b(1), a(2) + 1:b(2) &
+        + 1, a(3):b(3), 2) > 0.0_wp .or. cf(a(1):b(1), a(2):b(2), a(3) + 1:b(3) + 1, 3) > 0.0_wp)
     end associate
   end function closed_cells_zero
 

@@ -59,8 +59,7 @@ contains
     call run(sim, 3)
     weight = 998.2_wp*g*0.04_wp*0.03_wp*0.035_wp
     call check('outflow: water at rest', sim%flow%u(1:12, 1:8, 1:12, :), 0.0_wp, 1.0e-8_wp)
-    call check('outflow: no push on a block in the side', sim%blocks%fluid_force(1, 1), 0.0_wp, &
-               1.0e-6_wp*weight)
+    call check('outflow: no push sideways', sim%blocks%fluid_force(1, 1), 0.0_wp, 1.0e-6_wp*weight)
     call check('outflow: nothing has left', sim%flow%liquid_inflow, 0.0_wp, 1.0e-16_wp)
   end subroutine water_beside_outflow
 
@@ -93,13 +92,10 @@ contains
     call tank(body('box', place, rate, more='fixed=T angular_velocity=0,0,5'), sim)
     before = liquid_volume(sim%grid, sim%flow%liquid)
     call run(sim, 5)
-    call check('moved block: place', &
-      sim%blocks%x(:, 1) - place - rate*sim%clock%t, 0.0_wp, 1.0e-14_wp)
+    call check('moved: place', sim%blocks%x(:, 1) - place - rate*sim%clock%t, 0.0_wp, 1.0e-14_wp)
     call check('moved block: speed', sim%blocks%v(:, 1) - rate, 0.0_wp)
-    call check('moved block: turned', sim%blocks%q(4, 1), sin(0.5_wp*spin(3)*sim%clock%t), &
-               1.0e-14_wp)
-    call check('moved block: water', liquid_volume(sim%grid, sim%flow%liquid), before, &
-               1.0e-13_wp*before)
+    call check('moved: turned', sim%blocks%q(4, 1), sin(0.5_wp*spin(3)*sim%clock%t), 1.0e-14_wp)
+    call check('moved: water', liquid_volume(sim%grid, sim%flow%liquid), before, 1.0e-13_wp*before)
     call check('moved block: divergence', sim%report%divergence_max <= 1.0e-8_wp)
     call check('moved block: feels the water', norm2(sim%blocks%fluid_force(:, 1)) > 0.1_wp)
   end subroutine moved_block
@@ -115,8 +111,7 @@ contains
       call tank('&grid cells=13,1,11 length=.12,.01,.12/ &boundary y_min="'//trim(kind(n)) &
         //'" y_max="'//trim(kind(n))//'"/ &water min=0,-1,0 max=.051,1,.083/', sim(n), fluid='')
       call run(sim(n), 10)
-      call check('slice: converged', sim(n)%report%pressure_converged &
-                 .and. sim(n)%report%viscous_converged)
+      call check('solved', sim(n)%report%pressure_converged .and. sim(n)%report%viscous_converged)
       call check('slice: water falls', minval(sim(n)%flow%u(1:13, 1, 1:11, 3)) < -0.02_wp)
       call check('slice: nothing across', sim(n)%flow%u(1:13, 1, 1:11, 2), 0.0_wp, 1.0e-15_wp)
       call check('slice: volume', liquid_volume(sim(n)%grid, sim(n)%flow%liquid), &
@@ -187,8 +182,7 @@ contains
     call run(sim, 1)
     row(2) = sum(sim%flow%liquid(1:12, 1:8, 7))
     call check('release: it is there', sim%blocks%present(1))
-    call check('release: volume', liquid_volume(sim%grid, sim%flow%liquid), before, &
-               1.0e-12_wp*before)
+    call check('its volume', liquid_volume(sim%grid, sim%flow%liquid), before, 1.0e-12_wp*before)
     call check('release: the level has risen by the block', row(2) - row(1), &
                0.04_wp*0.03_wp*0.035_wp, 0.05_wp*0.04_wp*0.03_wp*0.035_wp)
     call check('release: it falls', sim%blocks%v(3, 1) < 0.0_wp)
@@ -239,8 +233,7 @@ contains
     end do
     call fill_scalar_halo(sim%grid, sim%flow%p)
     call run(sim, 1)
-    call check('noise in gas: converged', sim%report%pressure_converged .and. &
-      sim%report%viscous_converged)
+    call check('noise in gas', sim%report%pressure_converged .and. sim%report%viscous_converged)
   end subroutine fall_into_water
 
 end module test_step_m

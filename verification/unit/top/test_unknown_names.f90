@@ -43,9 +43,8 @@ contains
   end subroutine test_unknown_names
 
   !> Exit status of this program with an argument.
-  function status_of(argument) result(status)
+  integer function status_of(argument) result(status)
     character(*), intent(in) :: argument
-    integer :: status
     character(4096) :: program
 
     call get_command_argument(0, program)

@@ -50,15 +50,13 @@ contains
     call check('all know their body', all(merged%body(:merged%n) == 1))
     call check('each cell once', count(merged%number > 0) == merged%n)
     call check('small have their centre in the box', all([(centre_in_box(m), m=1, merged%n_small)]))
-    call check('the top layer belongs to the cells above', &
-               all(target_of(4, 5, top) == [4, 5, top + 1]))
+    call check('the top layer belongs to those above', all(target_of(4, 5, top) == [4, 5, top + 1]))
     call check('at an edge to both beside it, most to the one along the normal', &
       merged%share(:, merged%number(4, 6, top)), [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
     call check('no profile at an edge', merged%r(:, merged%number(4, 6, top)), spread(1.0_wp, 1, 3))
     call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
-    call check('the middle of a small lies at half of it', &
-               merged%r(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
+    call check('the middle of a small one', merged%r(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
     call check('no small is alone', .not. any([(is_unmerged(merged, m), m=1, merged%n_small)]))
     call check('the shares of a small are one', sum(merged%share(:, :merged%n_small), 1), &
                spread(1.0_wp, 1, merged%n_small), 1.0e-13_wp)
@@ -76,14 +74,14 @@ contains
     call check('with free slip the wall bears nothing', to_wall, 0.0_wp, 1.0e-14_wp*sum(mass))
     call check('across the wall a small lies between wall and target', u(4, 5, top, 3), &
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
-    call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
+    call check('with free slip all move alike', u(4, 5, top, 1:2), &
                u(4, 5, top + 1, 1:2), 1.0e-12_wp)
     merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the small cell
     call random_field(seed, u)
     total = momentum(u)
     before = u
     call share()
-    call check('with a layer the momentum is kept too', momentum(u) + sum(to_wall, 2), total, &
+    call check('with a layer it is kept too', momentum(u) + sum(to_wall, 2), total, &
                1.0e-11_wp*sum(mass))
     call the_lever(before(4, 5, top, :), before(4, 5, top + 1, :))
     call check('along the wall a small has more of the velocity of its target', u(4, 5, top, 1:2), &
@@ -117,8 +115,7 @@ contains
       do d = 1, 2
         excess = small(d) - wall(4, 5, d) - t*(target(d) - wall(4, 5, d))
         change = t*m_small*excess/(m + t**2*m_small)
-        call check('the target gets its end of the lever', u(4, 5, top + 1, d), &
-                   target(d) + change, 1.0e-12_wp)
+        call check('the end of the target', u(4, 5, top + 1, d), target(d) + change, 1.0e-12_wp)
         call check('the wall the other one', to_wall(d, f), &
                    (1.0_wp - t)*m_small*(excess - t*change), 1.0e-12_wp)
       end do
@@ -176,8 +173,7 @@ contains
     u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
     u(4, 5, top, :) = 99.0_wp
     call follow_targets(box%grid, merged, mass, noted, u, to_wall)
-    call check('small change with their target', u(4, 5, top, :) - before(4, 5, top, :), t*change, &
-               1.0e-14_wp)
+    call check('small as targets', u(4, 5, top, :) - before(4, 5, top, :), t*change, 1.0e-14_wp)
     call check('others do not', u(5, 5, top, :) - before(5, 5, top, :), 0.0_wp, 1.0e-14_wp)
     n = merged%target(3, small)
     call check('targets, small and wall have what the merged viscous mass has', &

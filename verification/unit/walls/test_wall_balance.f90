@@ -131,8 +131,7 @@ contains
     f = box%case%fluid%liquid_density*box%grid%volume &
         *([0.5_wp, 0.3_wp, 0.3_wp]*pushed - 0.3_wp*taken)/dt
     call check('one small: force', force(1:3, 1), f, 1.0e-10_wp)
-    call check('one small: torque', force(4:6, 1), cross([0.16_wp, -0.05_wp, 0.02_wp], f), &
-               1.0e-10_wp)
+    call check('its torque', force(4:6, 1), cross([0.16_wp, -0.05_wp, 0.02_wp], f), 1.0e-10_wp)
   end subroutine one_small
 
   !> Where all gains as the box does, the wall bears the fluid that no aperture counts; where faces

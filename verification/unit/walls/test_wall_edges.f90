@@ -62,8 +62,7 @@ contains
         if (all(solid%held_face(:, m) == [3, 3, 4, 1])) n = m
       end do
       call check('the list has it', n > 0)
-      if (n > 0) call check('with its share', solid%held_share(n), 1.0_wp - 1.0_wp/inertia, &
-                            1.0e-12_wp)
+      if (n > 0) call check('its share', solid%held_share(n), 1.0_wp - 1.0_wp/inertia, 1.0e-12_wp)
     end associate
   end subroutine held_at_edge
 
@@ -100,8 +99,7 @@ contains
   subroutine sphere()
     call build('kind="sphere" size=.8', 'position=.513,.487,.505')
     call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp)
-    call check('sphere: little held fluid', &
-               maxval(body%solid%aperture - body%solid%effective) < 0.1_wp)
+    call check('sphere: little held', maxval(body%solid%aperture - body%solid%effective) < 0.1_wp)
   end subroutine sphere
 
   !> Variables of &shape and &body.

@@ -57,8 +57,7 @@ contains
     call run_along(0.0_wp, -0.2_wp)
     call check('no layer: free slip', share(), 1.0_wp, 1.0e-12_wp)
     call run_along(1.0_wp, -0.2_wp)
-    call check('a layer of one cell', share(), layer(0.15_wp, 1.0_wp) &
-               /layer(0.8_wp, 1.0_wp), 1.0e-12_wp)
+    call check('one cell', share(), layer(0.15_wp, 1.0_wp)/layer(0.8_wp, 1.0_wp), 1.0e-12_wp)
   end subroutine above_the_box
 
   !> A box that ends 0.05 cells below the centres of its top cells.
@@ -66,8 +65,7 @@ contains
     call place(tank//'&shape name="b" kind="box" size=.36,.36,.345/ &body shape="b" ' &
                //'position=.39,.4,.1725'//moving, box, merged)
     wall = wall_at(box, [4, 5, top])
-    call check('at first all centres have all', &
-               all(abs(merged%centre(:merged%n) - 1.0_wp) <= 0.0_wp))
+    call check('at first centres have all', all(abs(merged%centre(:merged%n) - 1.0_wp) <= 0.0_wp))
     call run_along(1.0e6_wp, of_fluid)
     call check('shear: linear', centre(), at_centre/of_fluid, 1.0e-5_wp)
     call there_and_back()
@@ -75,8 +73,7 @@ contains
     call check('no layer: as of one as thick as the fluid is far', centre(), &
                layer(at_centre, of_fluid)/layer(of_fluid, of_fluid), 1.0e-12_wp)
     call run_along(1.0_wp, of_fluid)
-    call check('a layer of one cell', centre(), &
-               layer(at_centre, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
+    call check('one cell', centre(), layer(at_centre, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
     call as_the_links_pull()
   end subroutine at_centres
 
@@ -102,7 +99,7 @@ contains
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
       call find_centres(box%grid, box%solid, box%bodies, u, merged)
-      call check('a short link', centre(), layer(counts(i), 1.0_wp)/layer(of_fluid, 1.0_wp), &
+      call check('short link', centre(), layer(counts(i), 1.0_wp)/layer(of_fluid, 1.0_wp), &
                  1.0e-12_wp)
     end do
   end subroutine as_the_links_pull
