@@ -41,7 +41,7 @@ program mics
   type(options_t) :: options
   type(case_t) :: case
   type(shape_t), allocatable :: shapes(:)
-  type(bed_t) :: bed
+  type(bed_t), target :: bed
   type(simulation_t) :: sim
   type(output_t) :: output
   type(step_report_t) :: report
@@ -56,7 +56,7 @@ program mics
   call read_options()
   call require_memory()
   call read_and_check()
-  call require_memory(case, shapes)
+  call require_memory(case, shapes, bed)
   call catch_signals()
   call simulation_init(case, shapes, bed, sim)
   parameters = all_parameters(case, shapes, bed)
@@ -160,7 +160,7 @@ contains
       return
     end if
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
-    call find_case_warnings(case, shapes, warnings)
+    call find_case_warnings(case, shapes, bed, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
     message = ''

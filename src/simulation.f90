@@ -63,7 +63,7 @@ contains
   subroutine simulation_init(case, shapes, bed, sim)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(in), target :: bed   !! which stays where it is
     type(simulation_t), intent(inout), target :: sim
     integer :: d, n_solids
 
@@ -80,7 +80,7 @@ contains
     call clock_init(case%run, sim%clock)
     call grid_init(case%grid, case%boundary, sim%grid)
     call walls_init(case%grid, case%boundary, sim%walls)
-    sim%walls%bed = bed
+    sim%walls%bed => bed
     call blocks_init(case, shapes, sim%blocks)
     call contacts_init(contact_of(case), sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)

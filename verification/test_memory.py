@@ -1,11 +1,13 @@
 """What a run will take in memory is planned; too much of it ends with a reason, nothing written. So
 does too small a stack."""
 
+import math
 import os
 import re
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -105,6 +107,34 @@ def test_a_block_on_the_floor_has_enough(tmp_path: Path) -> None:
     plan, _ = planned(mics(tmp_path, "48, 48, 48", "--check", case=case).stdout)
     done = mics(tmp_path, "48, 48, 48", "--quiet", limit=1.05 * plan + 11e6, case=case)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+HEIGHTS: dict[str, Callable[[int, int], float]] = {
+    "rough": lambda i, j: 1 + 0.3 * math.sin(1e4 * math.sin(12.9898 * i + 78.233 * j)),
+    "wavy": lambda i, j: 2 + math.sin(i / 40) * math.cos(j / 50),
+    "even": lambda i, j: 0.5 + i / 300,
+}
+
+
+@pytest.mark.parametrize("form", HEIGHTS)
+@pytest.mark.parametrize("physics", ["dry", "fluid"])
+def test_a_bed_is_in_the_plan(form: str, physics: str, tmp_path: Path) -> None:
+    """Within a fifth of what a run takes, and 1.4 kB for a height at most."""
+    n = 400
+    rows = (" ".join(f"{HEIGHTS[form](i, j):.4f}" for i in range(n)) for j in range(n))
+    (tmp_path / "bed.txt").write_text(f"{n} {n} 0 0 0.25 0.25\n" + "\n".join(rows))
+    case = (
+        f"&run t_end = 0.01  dt = 0.01  field_interval = 0  physics = '{physics}' /\n"
+        "&grid cells = 50, 50, 20  length = 99.75, 99.75, 20 /\n&fluid water_level = 9.1 /\n"
+        "&bed file = 'bed.txt' /\n"
+    )
+    plan, _ = planned(run_text(tmp_path, case, "--check").stdout)
+    with subprocess.Popen([MICS, "--quiet", "case.nml"], cwd=tmp_path) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    taken = 1024 * usage.ru_maxrss
+    assert process.returncode == 0 and 0.8 < plan / taken < 1.2, (plan, taken)
+    assert physics != "dry" or taken < 30e6 + 1400 * n**2
 
 
 SMALL = TANK.replace("= 1 /", "= 0.01 /") + "&fluid water_level = 0.1 /\n"

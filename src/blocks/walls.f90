@@ -10,6 +10,8 @@ module walls_m
 
   integer, parameter :: floor_wall = -5   !! number of the side z_min
 
+  type(bed_t), target :: no_bed
+
   !> Sides that blocks can touch (`no_slip` and `slip`), and the periods of the others.
   !!
   !! A wall is a counterpart with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max; the
@@ -21,14 +23,14 @@ module walls_m
     real(wp) :: offset(6) = 0.0_wp          !! normal.x of the points of the wall [m]
     real(wp) :: velocity(3, 6) = 0.0_wp     !! of the wall in its own plane [m/s]
     logical :: slip(6) = .false.            !! no friction with the fluid
-    type(bed_t) :: bed
+    type(bed_t), pointer :: bed => no_bed   !! large, so it is there once
     real(wp) :: period(3) = 0.0_wp          !! length of the tank where it is periodic, else 0 [m]
   end type walls_t
 
 contains
 
   !> The contact walls of a case, without a bed.
-  pure subroutine walls_init(grid, boundary, walls)
+  subroutine walls_init(grid, boundary, walls)
     type(grid_input_t), intent(in) :: grid
     type(boundary_input_t), intent(in) :: boundary
     type(walls_t), intent(out) :: walls

@@ -73,7 +73,7 @@ contains
   subroutine check_case(case, shapes, bed, problems)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! from `make_shapes`, one for each `&shape`
-    type(bed_t), intent(in) :: bed           !! from `make_bed`
+    type(bed_t), intent(in), target :: bed   !! from `make_bed`
     type(problems_t), intent(inout) :: problems
     type(scene_t) :: scene
     type(case_t) :: known   ! the case without the sides that are wrong

@@ -64,7 +64,7 @@ contains
     if (with_blocks) call print_shapes(unit, case, shapes, n_points)
     if (with_blocks) call print_bodies(unit, case, blocks, bed)
     call print_steps(unit, case, blocks, d_s, wet)
-    call print_memory(unit, case, shapes)
+    call print_memory(unit, case, shapes, bed)
     call print_files(unit, case, wet)
   end subroutine print_plan
 
@@ -437,14 +437,15 @@ contains
   end subroutine print_body_steps
 
   !> Estimate of the memory of all processes together, and what there is.
-  subroutine print_memory(unit, case, shapes)
+  subroutine print_memory(unit, case, shapes, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
     character(:), allocatable :: there
     integer(i8) :: planned, available
 
-    planned = planned_memory(case, shapes)
+    planned = planned_memory(case, shapes, bed)
     available = available_memory()
     there = size_text(real(available, wp))//' that this machine has left'
     call heading(unit, 'Memory')

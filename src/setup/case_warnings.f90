@@ -6,6 +6,7 @@ module case_warnings_m
     smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use case_blocks_m, only: turning_share
+  use bed_m, only: bed_t
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
   use vectors_m, only: rotation_matrix
   use drops_m, only: place_of_block, place_of_body, shape_of_place
@@ -33,9 +34,10 @@ module case_warnings_m
 contains
 
   !> Collect everything odd about a checked case; nothing of it forbids a run.
-  subroutine find_case_warnings(case, shapes, warnings)
+  subroutine find_case_warnings(case, shapes, bed, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
     type(problems_t), intent(inout) :: warnings
     integer(i8) :: planned, available   ! [B]
     integer :: s
@@ -46,7 +48,7 @@ contains
     if (has_flow(case%run)) then
       call look_at_sides(case, warnings)
     end if
-    planned = planned_memory(case, shapes)
+    planned = planned_memory(case, shapes, bed)
     available = available_memory()
     if (available > 0 .and. planned > available) call warnings%add_message('&grid cells = ' &
       //to_text(case%grid%cells)//': the run takes about '//size_text(real(planned, wp)) &

@@ -3,7 +3,8 @@
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
 !! and both couplings (gfortran 12): 550 to 820 B for a cell, those of the halo counted, 1240 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
-!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell.
+!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell. Beds: maps of 300**2
+!! and 600**2 heights, even, wavy and rough; each process has its own.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp, i8
@@ -11,6 +12,7 @@ module memory_plan_m
   use parallel_m, only: nproc, is_root, global_max
   use case_types_m, only: case_t, has_flow
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
   use machine_memory_m, only: available_memory, memory_limit
   implicit none
   private
@@ -21,17 +23,21 @@ module memory_plan_m
   integer(i8), parameter :: bytes_of_landing = 36      !! more for each cell where blocks land [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
   integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]
+  integer(i8), parameter :: bytes_of_bed(2) = [220, 212]        !! of a facet, of a bent edge [B]
+  integer(i8), parameter :: bytes_of_bed_solid = 2450           !! of a facet, for the flow [B]
+  integer(i8), parameter :: bytes_to_make_bed(2) = [420, 162]   !! the same at the start [B]
   integer(i8), parameter :: bytes_at_rest = 30000000   !! program and libraries [B]
   integer, parameter :: halo = 3                       !! cells beside the domain, on each side
 
 contains
 
   !> Estimate of the memory of all processes together [B].
-  pure function planned_memory(case, shapes) result(bytes)
+  function planned_memory(case, shapes, bed) result(bytes)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
     integer(i8) :: bytes
-    integer(i8) :: each, blocks
+    integer(i8) :: each, blocks, features(2)
     integer :: s
 
     blocks = size(case%body) + sum(int(case%drop%count, i8))
@@ -46,14 +52,20 @@ contains
     do s = 1, size(shapes)
       bytes = bytes + bytes_per_piece*(size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius))
     end do
+    if (.not. bed%there) return   ! else most while it is made, or while the run goes on
+    features = [size(bed%triangle, 2), size(bed%surface%edge)]
+    if (has_flow(case%run)) bytes = bytes + nproc()*bytes_of_bed_solid*features(1)
+    bytes = max(bytes + nproc()*sum(bytes_of_bed*features), &
+      bytes_at_rest + nproc()*sum(bytes_to_make_bed*features))
   end function planned_memory
 
   !> End with code 4 if the share of this process, or of another one, in the memory that the run
   !! will take is above its limit; warn if the run takes more than the machine has left. Call it
   !! before anything is written, and first without a case: is there memory to read one?
-  subroutine require_memory(case, shapes)
+  subroutine require_memory(case, shapes, bed)
     type(case_t), intent(in), optional :: case
     type(shape_t), intent(in), optional :: shapes(:)
+    type(bed_t), intent(in), optional :: bed
     character(:), allocatable :: asked, left
     integer(i8) :: planned, available
     real(wp) :: beyond(1)
@@ -61,7 +73,7 @@ contains
     planned = bytes_at_rest
     asked = 'the program takes '//size_text(real(planned, wp))//' of memory'
     if (present(case)) then
-      planned = planned_memory(case, shapes)
+      planned = planned_memory(case, shapes, bed)
       asked = 'the run takes about '//size_text(real(planned, wp))//' of memory'
       if (nproc() > 1) asked = asked//' in '//to_text(nproc())//' processes'
     end if

@@ -43,7 +43,7 @@ contains
   subroutine set_scene(case, shapes, bed, scene)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(in), target :: bed
     type(scene_t), intent(out) :: scene
     type(case_t) :: good          ! the good bodies and one more, no drops
     type(shape_t), allocatable :: made(:)
@@ -77,7 +77,7 @@ contains
     call blocks_init(good, made, scene%two)
     call overlap_init(made, 2, scene%overlap)
     if (.not. case%grid%extent_faulty) call walls_init(case%grid, case%boundary, scene%walls)
-    scene%walls%bed = bed
+    scene%walls%bed => bed
     scene%no_walls%period = scene%walls%period
     allocate (scene%held(scene%n), scene%outside(scene%n))
     scene%outside = .false.

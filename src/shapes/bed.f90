@@ -137,7 +137,7 @@ contains
     character(:), allocatable, intent(out) :: message   !! empty, or what is wrong
     type(shape_t) :: net
     real(wp), allocatable :: low(:, :), high(:, :)
-    real(wp) :: area, spacing
+    real(wp) :: area, spacing, extent
     integer :: m, n
 
     message = ''
@@ -148,14 +148,11 @@ contains
     call join_points(case, bed)
     area = 0.0_wp
     n = size(bed%triangle, 2)
-    allocate (low(3, n), high(3, n))
     do m = 1, n
       associate (p => bed%point(:, bed%triangle(:, m)))
-        low(:, m) = minval(p, 2)
-        high(:, m) = maxval(p, 2)
+        extent = maxval(maxval(p, 2) - minval(p, 2))
         spacing = norm(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1)))
-        if (.not. spacing > (same_place*maxval(high(:, m) - low(:, m)))*maxval(high(:, m) &
-                            - low(:, m))) then
+        if (.not. spacing > (same_place*extent)*extent) then
           message = 'the facet at '//point_text(p(:, 1))//' has no area'
           return
         end if
@@ -168,12 +165,18 @@ contains
     net%facet_point = reshape(bed%triangle, [3*n])
     net%smallest_edge = 2*spacing   ! sets the bins only
     call surface_init(net, bed%surface, with_net=.false.)
+    deallocate (net%point, net%facet, net%facet_point)
     ! a place on the edge between two flat facets must not slip between them
     bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
     bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
     bed%surface%vertex = bed%surface%vertex(:, :bed%surface%n_corners)
     bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
     call bins_build(bed%surface%vertex, bed%surface%vertex, spacing, bed%surface%vertices)
+    allocate (low(3, n), high(3, n))
+    do m = 1, n
+      low(:, m) = minval(bed%point(:, bed%triangle(:, m)), 2)
+      high(:, m) = maxval(bed%point(:, bed%triangle(:, m)), 2)
+    end do
     low = near_tank(case, low)
     high = near_tank(case, high)
     low(3, :) = 0.0_wp

@@ -18,7 +18,7 @@ module world_m
 
   type, extends(simulation_t) :: world_t
     type(shape_t), allocatable :: shapes(:)
-    type(bed_t) :: bed
+    type(bed_t), pointer :: bed => null()
     type(step_report_t) :: report       !! of the last step
     type(contact_report_t) :: contact   !! of the last step of the bodies alone
   end type world_t
@@ -34,6 +34,7 @@ contains
 
     case = case_of(text)
     call make_shapes(case, world%shapes, problems)
+    allocate (world%bed)
     call make_bed(case, world%bed, problems)
     call problems%report(error_unit)
     if (problems%n > 0) error stop 'world_m: the case is refused'
@@ -47,7 +48,7 @@ contains
     type(world_t), intent(out) :: world
 
     world%shapes = other%shapes
-    world%bed = other%bed
+    world%bed => other%bed
     call simulation_init(case, world%shapes, world%bed, world%simulation_t)
   end subroutine begin
 

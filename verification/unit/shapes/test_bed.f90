@@ -23,7 +23,7 @@ module test_bed_m
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use bed_file_m, only: bed_form_t, read_bed_file
-  use bed_m, only: set_bed, bed_covers, bed_distance, bed_place
+  use bed_m, only: bed_t, set_bed, bed_covers, bed_distance, bed_place
   implicit none
   private
   public :: test_bed
@@ -36,7 +36,8 @@ module test_bed_m
   type(grid_t) :: grid
   type(solid_geometry_t) :: solid
   type(blocks_t) :: blocks
-  type(walls_t) :: walls   !! and the bed
+  type(walls_t) :: walls
+  type(bed_t), target :: bed
   type(shape_t) :: shapes(1)
   type(found_t) :: found
   character(:), allocatable :: message
@@ -61,8 +62,9 @@ contains
 
     case = case_of(groups)
     call walls_init(case%grid, case%boundary, walls)
+    walls%bed => bed
     walls%n = 0
-    call set_bed(case, form, walls%bed, message)
+    call set_bed(case, form, bed, message)
     call check('the bed is made: '//message, walls%bed%there)
   end subroutine lay_bed
 
@@ -226,7 +228,7 @@ contains
       t=1, n)], [3, 3*n])
     form%triangle = reshape([(c, c=1, 3*n)], [3, n])
     form%checksum = ''
-    call set_bed(case, form, walls%bed, message)
+    call set_bed(case, form, bed, message)
     call check('the shape is taken: '//message, walls%bed%there)
   end subroutine lie_as_bed
 
@@ -337,6 +339,7 @@ contains
     call hexapod()
     x = 0.05_wp
     call walls_init(case%grid, case%boundary, walls)
+    walls%bed => bed
     walls%n = 0
     call lie_as_bed(x, upright)
     worst = 0.0_wp
