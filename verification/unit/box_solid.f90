@@ -8,7 +8,12 @@ module box_solid_m
   use solid_geometry_m, only: solid_geometry_t
   implicit none
   private
-  public :: set_boxes, simple_grid
+  public :: set_boxes, set_tetrahedra, simple_grid
+
+  !> Boxes, or one.
+  interface set_boxes
+    procedure :: set_many, set_one
+  end interface set_boxes
 
   integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, &
                                              2, 1, 3, 1, 3, 2], [3, 6])
@@ -39,7 +44,7 @@ contains
   end subroutine simple_grid
 
   !> Fill shares, open faces and tetrahedra of boxes that do not overlap.
-  subroutine set_boxes(grid, low, high, solid)
+  subroutine set_many(grid, low, high, solid)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, boxes) [m]
     type(solid_geometry_t), intent(inout) :: solid
@@ -106,7 +111,15 @@ contains
       solid%n_cut = m
       solid%cut(c(1), c(2), c(3)) = m
     end subroutine add_cut_cell
-  end subroutine set_boxes
+  end subroutine set_many
+
+  subroutine set_one(grid, low, high, solid)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    type(solid_geometry_t), intent(inout) :: solid
+
+    call set_many(grid, reshape(low, [3, 1]), reshape(high, [3, 1]), solid)
+  end subroutine set_one
 
   !> Each box as six tetrahedra around its diagonal.
   subroutine set_tetrahedra(low, high, solid)

@@ -1,10 +1,11 @@
-!> Checks for the unit tests: count, name what failed, end with an exit code.
+!> Checks for the unit tests: count, name what failed, end with an exit code. Every test needs them
+!! and the working precision, which comes along.
 module check_m
   use, intrinsic :: iso_fortran_env, only: compiler_options, error_unit, output_unit
-  use kinds_m, only: wp
+  use kinds_m, only: wp, sp, i8, pi
   implicit none
   private
-  public :: check, checked, wanted, finish_checks
+  public :: check, checked, wanted, finish_checks, wp, sp, i8, pi
 
   !> With run-time checks, some eight times as slow: fewer random poses and damaged places do.
   logical, parameter :: checked = index(compiler_options(), '-fcheck=all') > 0

@@ -5,7 +5,7 @@ module one_body_m
   use errors_m, only: problems_t
   use case_types_m, only: case_t
   use case_check_m, only: make_shapes
-  use case_text_m, only: case_of
+  use case_text_m, only: case_of, slip, sides, body
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
@@ -18,7 +18,7 @@ module one_body_m
   use coupling_m, only: copy_motion
   implicit none
   private
-  public :: one_body_t, place, wall_at, layer, random_numbers, random_field
+  public :: one_body_t, place, slip, sides, body, wall_at, layer, random_numbers, random_field
 
   type :: one_body_t
     type(case_t) :: case

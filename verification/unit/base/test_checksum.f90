@@ -1,7 +1,6 @@
 !> The restart checksum sees every kind of damage and does not depend on how the data is cut.
 module test_checksum_m
-  use kinds_m, only: wp, i8
-  use check_m, only: check
+  use check_m, only: check, wp, i8
   use checksum_m, only: checksum_t
   implicit none
   private

@@ -1,7 +1,6 @@
 !> Numbers as text stay short and read back. Messages: `verification/messages`.
 module test_errors_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use errors_m, only: to_text
   implicit none
   private

@@ -3,8 +3,7 @@ module test_exact_sum_m
   use, intrinsic :: iso_fortran_env, only: real128
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_set_halting_mode, &
     ieee_set_flag, ieee_invalid
-  use kinds_m, only: wp, i8
-  use check_m, only: check
+  use check_m, only: check, wp, i8
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_dots, exact_add, exact_totals, &
     exact_add_columns, merge_accumulators, no_terms, accumulator_size
   use parallel_m, only: set_threads

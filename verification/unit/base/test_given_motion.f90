@@ -1,8 +1,7 @@
 !> Bodies moved by a table: through its rows, at rest outside, smooth, and with rates that are those
 !! of the pose.
 module test_given_motion_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: quaternion_from_axis, quaternion_product, quaternion_log, quaternion_exp
   use given_motion_m, only: given_motion_t, given_motion_init, pose_at, fastest_between
   implicit none
@@ -12,21 +11,16 @@ module test_given_motion_m
 contains
 
   subroutine test_given_motion()
-    call check_log()
+    real(wp), parameter :: w(3) = [0.3_wp, -1.1_wp, 0.7_wp]
+
+    call check('logarithm', quaternion_log(quaternion_exp(w)), w, 1.0e-15_wp)
+    call check('the shorter way', quaternion_log(-quaternion_exp(w)), w, 1.0e-15_wp)
+    call check('of none', quaternion_log([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), 0.0_wp)
     call check_rows_and_rates()
     call check_hinge()
     call check_steady()
     call check_one_row()
   end subroutine test_given_motion
-
-  subroutine check_log()
-    real(wp), parameter :: w(3) = [0.3_wp, -1.1_wp, 0.7_wp]
-
-    call check('logarithm', quaternion_log(quaternion_exp(w)), w, 1.0e-15_wp)
-    call check('the shorter way', quaternion_log(-quaternion_exp(w)), w, 1.0e-15_wp)
-    call check('of none', &
-      quaternion_log([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]), [0.0_wp, 0.0_wp, 0.0_wp])
-  end subroutine check_log
 
   !> A motion with uneven times and turns about all axes.
   subroutine make_any(time, x, q, motion)

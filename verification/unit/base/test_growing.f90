@@ -1,7 +1,6 @@
 !> Lists that grow keep what is in them, and grow by doubling.
 module test_growing_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use growing_m, only: ensure_capacity
   implicit none
   private

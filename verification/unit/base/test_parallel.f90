@@ -1,8 +1,7 @@
 !> The parallel layer: halos, gathering, reductions and order-free sums on any number of processes.
 ! ranks: 2 4
 module test_parallel_m
-  use kinds_m, only: wp, sp, i8
-  use check_m, only: check
+  use check_m, only: check, wp, sp, i8
   use exact_accumulator_m, only: accumulator_value
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_add, exact_totals, &
     no_terms, accumulator_size
@@ -77,7 +76,7 @@ contains
   subroutine test_halos(n, periodic)
     integer, intent(in) :: n(3)
     logical, intent(in) :: periodic(3)
-    integer :: lo(3), hi(3), i, j, k, wrong
+    integer :: lo(3), hi(3), i, j, k
     logical :: at_side(2, 3)
     real(wp), allocatable :: a(:, :, :), b(:, :, :, :), thin(:, :, :)
 
@@ -99,15 +98,10 @@ contains
     do i = 1, 3
       call halo_exchange(b, w, i)
     end do
-    wrong = 0
-    do k = lo(3) - w, hi(3) + w
-      do j = lo(2) - w, hi(2) + w
-        do i = lo(1) - w, hi(1) + w
-          if (abs(a(i, j, k) - label([i, j, k], n, periodic)) > 0) wrong = wrong + 1
-        end do
-      end do
+    do concurrent (k=lo(3) - w:hi(3) + w, j=lo(2) - w:hi(2) + w, i=lo(1) - w:hi(1) + w)
+      thin(i, j, k) = label([i, j, k], n, periodic)
     end do
-    call check('halo, edge and corner cells', wrong, 0)
+    call check('halo, edge and corner cells', all(abs(a - thin) <= 0))
     call check('an array of several fields', all(abs(b(:, :, :, 1) - a) <= 0) &
       .and. all(abs(b(:, :, :, 2) - merge(-2 - a, a, a > 0)) <= 0))
   end subroutine test_halos

@@ -1,7 +1,6 @@
 !> Cutting of tetrahedra and boxes by planes against closed forms and against each other.
 module test_polyhedron_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, polyhedron_of_box, cut_polyhedron, &
     polyhedron_moments, polyhedron_moments_below, tet_volume, tet_moments_below, &
     box_clip_moments_below
@@ -75,7 +74,7 @@ contains
   subroutine plane_through_corners()
     type(polyhedron_t) :: p
     real(wp) :: c(3, 4), n(3), volume, moment(3), lower, upper
-    integer :: a, b, e, d
+    integer :: a, d
     logical :: good
 
     c = 0.0_wp
@@ -88,18 +87,14 @@ contains
     call check('half by a plane through an edge', &
                volume_of_part(c, [1.0_wp, -1.0_wp, 0.0_wp], 0.0_wp), 1.0_wp/12.0_wp, 1e-17_wp)
     good = .true.
-    do a = -1, 1
-      do b = -1, 1
-        do e = -1, 1
-          if (a == 0 .and. b == 0 .and. e == 0) cycle
-          n = real([a, b, e], wp)
-          do d = -3, 3
-            call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
-            call polyhedron_moments_below(p, n, real(d, wp), lower, moment)
-            call polyhedron_moments_below(p, -n, -real(d, wp), upper, moment)
-            good = good .and. abs(lower + upper - 1.0_wp) < 1e-15_wp .and. lower >= 0.0_wp
-          end do
-        end do
+    do a = 0, 26
+      n = modulo(a/[1, 3, 9], 3) - 1.0_wp
+      if (a == 13) cycle   ! no direction
+      do d = -3, 3
+        call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
+        call polyhedron_moments_below(p, n, real(d, wp), lower, moment)
+        call polyhedron_moments_below(p, -n, -real(d, wp), upper, moment)
+        good = good .and. abs(lower + upper - 1.0_wp) < 1e-15_wp .and. lower >= 0.0_wp
       end do
     end do
     call check('box cut through its corners in all 26 directions', good)
@@ -138,7 +133,7 @@ contains
   subroutine cells_fill_the_tet()
     integer, parameter :: m = 4
     real(wp) :: c(3, 4), lo(3), v, mom(3), total, moment(3), whole, whole_moment(3), n(3), worst(2)
-    integer :: t, i, j, k
+    integer :: t, i
 
     worst = 0.0_wp
     do t = 1, 20
@@ -148,15 +143,11 @@ contains
       call tet_moments_below(c, n, 0.1_wp, whole, whole_moment)
       total = 0.0_wp
       moment = 0.0_wp
-      do k = 1, m
-        do j = 1, m
-          do i = 1, m
-            lo = real([i, j, k] - 1, wp)/real(m, wp)
-            call box_clip_moments_below(c, lo, lo + 1.0_wp/real(m, wp), n, 0.1_wp, v, mom)
-            total = total + v
-            moment = moment + mom
-          end do
-        end do
+      do i = 0, m**3 - 1
+        lo = modulo(i/[1, m, m**2], m)/real(m, wp)
+        call box_clip_moments_below(c, lo, lo + 1.0_wp/real(m, wp), n, 0.1_wp, v, mom)
+        total = total + v
+        moment = moment + mom
       end do
       worst(1) = max(worst(1), abs(total - whole))
       worst(2) = max(worst(2), maxval(abs(moment - whole_moment)))

@@ -1,8 +1,7 @@
 !> Timers count calls and seconds; a signal sets the flag and the program goes on.
 module test_timers_signals_m
   use, intrinsic :: iso_c_binding, only: c_int
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use parallel_m, only: parallel_pause
   use signals_m, only: catch_signals, signal_caught, signal_interrupt, signal_terminate
   use timers_m, only: timer, tic, toc, wall_clock, phases

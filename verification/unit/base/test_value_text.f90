@@ -1,9 +1,8 @@
 !> Numbers and names as text. What is no number: `verification/messages/case.txt`.
 module test_value_text_m
-  use check_m, only: check
   use value_text_m, only: parse_real, parse_integer, edit_distance, nearest_name, printable, &
     sanitise, quoted_text, fixed_text, value_ok, value_too_large
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   implicit none
   private
   public :: test_value_text

@@ -1,7 +1,6 @@
 !> Vector algebra, rotations and small solves, checked by identities.
 module test_vectors_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use vectors_m, only: cross, norm, normalised, quaternion_product, quaternion_from_axis, &
     quaternion_exp, rotation_matrix, inverse3
   use rotations_m, only: rotate

@@ -1,8 +1,7 @@
 !> What touches now and what will soon: which of the two a gap makes it, for both contact models,
 !! and how stiff both are together.
 module test_contact_detection_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use counterparts_m, only: update_counterparts
   use contact_detection_m, only: detect_contacts
   use world_m, only: world_t, set_up, body

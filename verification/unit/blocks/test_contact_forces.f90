@@ -1,7 +1,6 @@
 !> Contact forces: action and reaction, force as slope of energy, friction, damping, memory.
 module test_contact_forces_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: contact_input_t
   use vectors_m, only: cross
   use bed_m, only: bed_counterpart
@@ -22,6 +21,7 @@ module test_contact_forces_m
   real(wp), parameter :: k_n = 1.0e4_wp, k_t = 5.0e3_wp       !! [N/m^gamma]
   real(wp), parameter :: mu = 0.5_wp, wall_mu = 0.3_wp        !! friction [-]
   integer, parameter :: floor = -5
+  type(contact_detection_t) :: detected
   type(loads_t) :: loads
   type(displacements_t) :: rest
   type(contact_report_t) :: report
@@ -40,12 +40,13 @@ contains
   end subroutine test_contact_forces
 
   !> Three bodies at rest, stiffnesses with the constants above and a normal dashpot.
-  subroutine begin(gamma, eta, detected)
+  subroutine begin(gamma, eta)
     real(wp), intent(in) :: gamma, eta       !! [-], [N s/m]
-    type(contact_detection_t), intent(out) :: detected
+    type(contact_detection_t) :: fresh
     type(contact_input_t) :: input
     integer :: b
 
+    detected = fresh
     input%law = 'constants'
     input%k_n = k_n
     input%k_t = k_t
@@ -63,9 +64,8 @@ contains
   end subroutine begin
 
   !> Contact points and displacements as a substep finds them.
-  subroutine detect_again(point, detected, displacements)
+  subroutine detect_again(point, displacements)
     type(contact_point_t), intent(in) :: point(:)
-    type(contact_detection_t), intent(inout) :: detected
     type(displacements_t), intent(inout) :: displacements
     type(displacements_t) :: before
     integer :: t
@@ -87,13 +87,12 @@ contains
   !! about the origin, those on the floor included.
   subroutine check_reaction()
     integer, parameter :: a(8) = [2, 2, 3, 3, 3, 3, 3, 3], b(8) = [1, 1, floor, floor, 1, 1, 1, 2]
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     type(contact_point_t) :: point(8)
     real(wp) :: place(3, bed_counterpart:3), p(3), moment(3)
     integer :: t, i
 
-    call begin(1.5_wp, 20.0_wp, detected)
+    call begin(1.5_wp, 20.0_wp)
     place = 0.0_wp
     do i = 1, 3
       place(:, i) = vector(i, 1)
@@ -106,7 +105,7 @@ contains
         vector(t, 5), 0.01_wp*t, 0.1_wp*t, 1.0_wp, 10*vector(t, 6), 10*vector(t, 7))
       point(t)%normal = point(t)%normal/norm2(point(t)%normal)
     end do
-    call detect_again(point, detected, displacements)
+    call detect_again(point, displacements)
     call integrate_displacements(0.01_wp, detected, displacements)
     call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
     call check('forces add up to nothing', sum(loads%force, 2), 0*x, 1.0e-11_wp)
@@ -123,15 +122,14 @@ contains
   !! and contact points at rest keep theirs.
   subroutine check_energy()
     real(wp), parameter :: d = 0.02_wp, step = 1.0e-6_wp, stretch = 3.0e-3_wp
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     real(wp) :: energy(-1:1)
     integer :: i
 
-    call begin(1.5_wp, 0.0_wp, detected)
+    call begin(1.5_wp, 0.0_wp)
     do i = -1, 1
       call detect_again([contact_point_t(2, 1, 1, normal=z, depth=d + i*step, length=1.0_wp)], &
-        detected, displacements)
+        displacements)
       displacements%xi(:, 1) = 0.0_wp
       call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
       energy(i) = elastic_energy(detected, displacements, rest)
@@ -159,12 +157,11 @@ contains
   !! displacement is no larger.
   subroutine check_friction()
     real(wp), parameter :: d = 0.01_wp, push = k_n*d
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
 
-    call begin(1.0_wp, 0.0_wp, detected)
+    call begin(1.0_wp, 0.0_wp)
     call detect_again([contact_point_t(2, floor, 1, normal=-z, depth=d, length=1.0_wp), &
-      contact_point_t(3, 1, 1, normal=-z, depth=d, length=1.0_wp)], detected, displacements)
+      contact_point_t(3, 1, 1, normal=-z, depth=d, length=1.0_wp)], displacements)
     displacements%xi(:, 1) = 0.99_wp*wall_mu*push/k_t*x
     displacements%xi(:, 2) = 0.99_wp*mu*push/k_t*x
     call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
@@ -182,15 +179,14 @@ contains
   !! report knows the largest overlap, and the way against one another over the length.
   subroutine check_damping()
     real(wp), parameter :: d = 0.01_wp, dt = 0.02_wp, eta = 100.0_wp, closing = 0.8_wp
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     type(contact_point_t) :: point
     real(wp) :: force
 
-    call begin(1.0_wp, eta, detected)
+    call begin(1.0_wp, eta)
     point = contact_point_t(2, floor, 1, normal=-z, depth=d, length=0.5_wp)
-    call detect_again([point], detected, displacements)
-    call detect_again([point], detected, displacements)   ! it is not new any more
+    call detect_again([point], displacements)
+    call detect_again([point], displacements)   ! it is not new any more
     detected%counterparts%v(3, 2) = -closing
     report = contact_report_t()
     call sum_forces(dt, detected, displacements, loads, report)
@@ -207,16 +203,15 @@ contains
   subroutine check_strong_damping()
     real(wp), parameter :: d = 1.0e-6_wp, dt = 0.02_wp, closing = 0.8_wp
     real(wp), parameter :: eta(3) = mass(2)*[1.0e2_wp, 2.0e2_wp, 1.0e5_wp]   ! from D = 1 on
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     type(contact_point_t) :: point
     integer :: i
 
     point = contact_point_t(2, floor, 1, normal=-z, depth=d, length=0.5_wp)
     do i = 1, size(eta)
-      call begin(1.0_wp, eta(i), detected)
-      call detect_again([point], detected, displacements)
-      call detect_again([point], detected, displacements)   ! it is not new any more
+      call begin(1.0_wp, eta(i))
+      call detect_again([point], displacements)
+      call detect_again([point], displacements)   ! it is not new any more
       detected%counterparts%v(3, 2) = -closing
       call sum_forces(dt, detected, displacements, loads, report)
       call check('it stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), 1.0e-12_wp)
@@ -229,16 +224,15 @@ contains
     real(wp), parameter :: dt = 0.02_wp, eta = 100.0_wp, closing = 0.5_wp, way = closing*dt
     real(wp), parameter :: depth(3) = way*[0.25_wp, 1.0_wp, 3.0_wp], part(3) = [0.75_wp, 1.5_wp, &
       1.5_wp]
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     real(wp) :: force
     integer :: i
 
-    call begin(1.0_wp, eta, detected)
+    call begin(1.0_wp, eta)
     do i = 1, 3
       displacements%n = 0
       call detect_again([contact_point_t(2, floor, 1, normal=-z, depth=depth(i), length=1.0_wp)], &
-        detected, displacements)
+        displacements)
       detected%counterparts%v(3, 2) = -closing
       call sum_forces(dt, detected, displacements, loads, report)
       force = loads%force(3, 2)
@@ -251,14 +245,13 @@ contains
   !! plane as long as it was, and grows by the tangential way; others begin anew or are forgotten.
   subroutine check_memory()
     real(wp), parameter :: dt = 0.5_wp
-    type(contact_detection_t) :: detected
     type(displacements_t) :: displacements
     type(contact_point_t) :: point(3)
 
-    call begin(1.0_wp, 0.0_wp, detected)
+    call begin(1.0_wp, 0.0_wp)
     point = [contact_point_t(2, 1, 4, normal=z, depth=1.0_wp), contact_point_t(2, 1, 6, normal=z, &
       depth=1.0_wp), contact_point_t(3, 1, 4, normal=z, depth=1.0_wp, arm_a=2*z)]
-    call detect_again(point, detected, displacements)
+    call detect_again(point, displacements)
     call check('all are new', all(detected%groups%new(:3)))
     detected%counterparts%v(:, 1) = 3*x + 7*z
     detected%counterparts%omega(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
@@ -267,13 +260,13 @@ contains
     call check('turning takes part', displacements%xi(:, 3), dt*(3 - 2)*x, 1.0e-15_wp)
     point(1)%id = 5
     point(3)%normal = [0.6_wp, 0.0_wp, 0.8_wp]
-    call detect_again(point, detected, displacements)
+    call detect_again(point, displacements)
     call check('one is new', all(detected%groups%new(:3) .eqv. [.true., .false., .false.]))
     call check('and begins at nothing', displacements%xi(:, 1), 0*x)
     call check('one stays', displacements%xi(:, 2), 3*dt*x, 1.0e-15_wp)
     call check('one turns', displacements%xi(:, 3), dt*[0.8_wp, 0.0_wp, -0.6_wp], 1.0e-15_wp)
-    call detect_again(point(2:2), detected, displacements)
-    call detect_again(point, detected, displacements)
+    call detect_again(point(2:2), displacements)
+    call detect_again(point, displacements)
     call check('what has parted is forgotten', displacements%xi(:, 3), 0*x)
   end subroutine check_memory
 

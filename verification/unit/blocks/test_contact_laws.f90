@@ -1,7 +1,6 @@
 !> Load of contact points at rest, and how far they give way.
 module test_contact_laws_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, load_t, stiffness_t
   use contact_laws_m, only: choose_law, load_of, hard_depth, depth_at_rest

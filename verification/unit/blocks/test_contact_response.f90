@@ -1,8 +1,7 @@
 !> How contact points respond: damping of a pair, forces that follow from an energy, highest
 !! frequencies.
 module test_contact_response_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: contact_input_t
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use contact_law_m, only: contact_law_t, load_t

@@ -1,8 +1,7 @@
 !> Contact points of contact spheres: depth, place and normal on bodies, walls and periodic images,
 !! those that come soon, and none lost while a list is kept.
 module test_contact_spheres_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: rotation_matrix, quaternion_exp, quaternion_product
   use contact_points_m, only: contact_points_t
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points

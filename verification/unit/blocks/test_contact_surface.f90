@@ -1,8 +1,7 @@
 !> Contact points of exact surfaces: where they are, how deep, and forces that follow from an
 !! energy.
 module test_contact_surface_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use vectors_m, only: cross, quaternion_from_axis, quaternion_exp, quaternion_product, normalised
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: release_body

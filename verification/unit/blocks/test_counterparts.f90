@@ -1,7 +1,6 @@
 !> Two counterparts that touch: how they move against one another, and what a force does to both.
 module test_counterparts_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: cross
   use counterparts_m, only: inertia_t, motion_t, wrench_t, inverse_effective_mass, act, &
     relative_velocity

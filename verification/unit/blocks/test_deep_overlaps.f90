@@ -1,7 +1,6 @@
 !> Deep overlaps: noted with both bodies, told once, a fault where contact has failed.
 module test_deep_overlaps_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use deep_overlaps_m, only: deep_overlaps_t, store_overlap, store_points, warn_of_overlaps, &
     overlap_fault, size_of_pair, ask_for_deep

@@ -1,8 +1,7 @@
 !> Lists of contact points and displacements: order, parting, joining, and the groups that share
 !! one.
 module test_displacements_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, set_apart, &
     form_groups
   use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &

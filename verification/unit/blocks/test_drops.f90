@@ -1,7 +1,6 @@
 !> The random part of a drop: reproducible, uniform, and as wide as asked.
 module test_drops_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use case_types_m, only: drop_input_t, place_t
   use vectors_m, only: quaternion_from_axis, quaternion_product
   use rotations_m, only: rotate

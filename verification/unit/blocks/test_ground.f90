@@ -1,8 +1,7 @@
 !> How far down a block can come: exact heights on planes, edges, corners and balls; and shapes in
 !! random attitudes, which must lie apart there and overlap a little further down.
 module test_ground_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use tet_mesh_m, only: extent_along
   use vectors_m, only: rotation_matrix
   use random_counter_m, only: uniform, random_rotation

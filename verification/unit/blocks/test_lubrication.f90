@@ -1,7 +1,6 @@
 !> Films between spheres and walls: what they take from a fall, whom they push, and where they end.
 module test_lubrication_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use bed_m, only: bed_counterpart
   use lubrication_m, only: lubrication_init, lubricate, film_resistance, film_impulse, film_pull
   use world_m, only: world_t, set_up, body, move
@@ -121,8 +120,6 @@ contains
       expected = expected - film_pull(mu, d/2, a, h, expected)/(world%blocks%mass(1)*expected)*dh
       h = h + dh
     end do
-    print '(a, 2f9.5)', solver//': speed after a bounce in oil, expected ', world%blocks%v(3, 1), &
-      expected
     call check(solver//': speed after the bounce', world%blocks%v(3, 1), expected, 0.003_wp*v)
   end subroutine check_bounce
 

@@ -2,8 +2,7 @@
 !! them: how long they hold, how far their entries are, and that nothing which touches before they
 !! are renewed is missing.
 module test_near_features_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: rotation_matrix, quaternion_from_axis, quaternion_product
   use random_counter_m, only: random_rotation
   use surface_search_m, only: surface_t, nearest_on_surface

@@ -1,7 +1,6 @@
 !> True overlap of bodies and walls against depths known from geometry; pairs of near bodies.
 module test_overlap_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use case_types_m, only: case_t
   use tet_mesh_m, only: shape_t
   use vectors_m, only: quaternion_from_axis

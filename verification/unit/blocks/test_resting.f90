@@ -1,8 +1,7 @@
 !> Who falls asleep and who wakes at the start of a step, and where the displacements of its contact
 !! points go.
 module test_resting_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use errors_m, only: to_text
   use sleep_m, only: update_stillness
   use counterparts_m, only: update_counterparts

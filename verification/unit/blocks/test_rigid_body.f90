@@ -1,7 +1,6 @@
 !> Bodies of a case and their motion without contact.
 module test_rigid_body_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use tet_mesh_m, only: shape_t
   use vectors_m, only: quaternion_exp, rotation_matrix
   use rigid_body_m, only: blocks_t, release_body, begin_step, drift, kick, &

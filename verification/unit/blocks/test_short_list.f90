@@ -1,7 +1,6 @@
 !> The short list of a pair: how long it holds, and that nothing which touches meanwhile is missing.
 module test_short_list_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: crossing_t, cross_edges
   use near_features_m, only: poses_t, view_t, meeting_t, seen_from, way_between, near_features_t, &

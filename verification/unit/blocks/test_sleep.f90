@@ -1,9 +1,8 @@
 !> Blocks at rest sleep, bear what lies on them, and wake by touch, by flow and with a support: the
 !! rules one by one, and worlds beside others without sleep.
 module test_sleep_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use vectors_m, only: quaternion_from_axis, quaternion_product
-  use check_m, only: check
   use rigid_body_m, only: release_body, kinetic_energy, potential_energy, set_velocity_after_fluid
   use displacements_m, only: reserve_displacements
   use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_quiet, &
@@ -26,7 +25,6 @@ contains
     call check_balanced()
     call check_loads()
     do model = 1, 2
-      print '(a)', 'model '''//trim(models(model))//''''
       call check_quiet()
       call check_rest()
       call check_hit()

@@ -1,8 +1,8 @@
 !> Contact spheres: heights of a hexapod at rest, spheres inside the block, and their spacing.
 module test_sphere_placement_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: shape_input_t
+  use vectors_m, only: cross
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use contact_sphere_placement_m, only: height_errors
@@ -91,7 +91,7 @@ contains
       x = s%point(:, s%tet(:, t))
       do a = 1, 4
         associate (o => others(:, a))
-          n = turn(x(:, o(2)) - x(:, o(1)), x(:, o(3)) - x(:, o(1)))
+          n = cross(x(:, o(2)) - x(:, o(1)), x(:, o(3)) - x(:, o(1)))
           worst = max(worst, abs(abs(dot_product(s%sphere_centre(:, m) - x(:, o(1)), n)) &
             /norm2(n)/s%sphere_radius(m) - 1))
         end associate
@@ -174,12 +174,5 @@ contains
     call check('too many spheres: '//message, message == &
       'sphere_spacing = 0.0001: about 1200000 contact spheres, at most 20000')
   end subroutine spacing
-
-  pure function turn(u, v) result(w)
-    real(wp), intent(in) :: u(3), v(3)
-    real(wp) :: w(3)
-
-    w = [u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
-  end function turn
 
 end module test_sphere_placement_m

@@ -1,7 +1,6 @@
 !> How long a substep may be.
 module test_substep_limits_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use contact_detection_m, only: contact_detection_t

@@ -1,8 +1,7 @@
 !> Every group of a case: defaults, values, attitudes and the way back to text. What is said to bad
 !! inputs: `verification/test_messages.py`.
 module test_case_input_m
-  use check_m, only: check
-  use kinds_m, only: wp, pi
+  use check_m, only: check, wp, pi
   use errors_m, only: problems_t
   use case_types_m, only: case_t, contact_input_t, contact_of, is_given
   use case_input_m, only: read_case, parameters_text

@@ -1,10 +1,8 @@
 !> Fluid that moves along in an impact: of what is displaced, limited, and none at rest.
 module test_added_mass_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use added_mass_m, only: update_added_mass
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, slip
   implicit none
   private
   public :: test_added_mass

@@ -1,6 +1,6 @@
 !> One body in the grid by itself: shares, links, tetrahedra of cut cells, counted shares.
 module test_body_shares_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use vectors_m, only: quaternion_from_axis
   use polyhedron_m, only: box_clip_moments_below
   use share_lists_m, only: body_shares_t
@@ -8,9 +8,7 @@ module test_body_shares_m
   use body_shares_m, only: find_body_shares
   use cut_tets_m, only: cut_tets_t, list_cut_tets, faces_of_tet
   use subcell_shares_m, only: subcell_work_t, count_subcells
-  use case_text_m, only: slip, body_at => body
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, slip, body_at => body
   implicit none
   private
   public :: test_body_shares
@@ -63,10 +61,9 @@ contains
       call find_body_shares(grid, shape, position, q, row, body, changed)
       call check('found', changed)
       call list_cut_tets(tets, body)
-      volume = 0.0_wp
+      volume = sum(body%alpha(:body%n_cell))*grid%volume
       first = 0.0_wp
       do m = 1, body%n_cell
-        volume = volume + body%alpha(m)*grid%volume
         first = first + body%alpha(m)*grid%volume*(grid%origin + grid%h &
           *(body%base + body%cell(:, m) - 1 + body%centroid(:, m)))
       end do

@@ -1,6 +1,6 @@
 !> Archimedes' force and torque: submerged, through the level, with the pressures on the faces.
 module test_buoyancy_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use vectors_m, only: cross, quaternion_from_axis, rotation_matrix
   use grid_m, only: n_halo
   use mixture_m, only: mix_fluid, face_mean
@@ -9,9 +9,7 @@ module test_buoyancy_m
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
   use buoyancy_m, only: displaced_force, mass_defect
   use errors_m, only: to_text
-  use case_text_m, only: sides, body
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, sides, body
   implicit none
   private
   public :: test_buoyancy

@@ -1,6 +1,6 @@
 !> One monolithic step of a free block in liquid: momentum, divergence, added mass, free fall.
 module test_coupling_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use errors_m, only: to_text
   use vectors_m, only: quaternion_from_axis
   use rigid_body_m, only: begin_step
@@ -14,7 +14,6 @@ module test_coupling_m
   use case_types_m, only: case_t
   use case_text_m, only: case_of, sides, body
   use one_body_m, only: one_body_t, place
-  use check_m, only: check
   implicit none
   private
   public :: test_coupling
@@ -128,8 +127,6 @@ contains
     call check('let go: no velocity yet', &
       maxval(abs(block%flow%uf - uf)) + maxval(abs(coupling%bodies%motion)), 0.0_wp)
     p = block%flow%p - p
-    print '(a, 2f8.4)', 'let go: acceleration over theory, pressure over that of a dipole ', &
-      -a(3)/(g*expected), (p(8, 8, 4) - p(8, 8, 13))/(-1000.0_wp*a(3)*dipole)
     call check('let go: the pressure of a dipole, more between walls', (p(8, 8, 4) - p(8, 8, 13)) &
                /(-1000.0_wp*a(3)*dipole), 1.0_wp, 0.3_wp)
     if (s < 1.0_wp) return   ! 12 cells instead of 5 are needed: case free_sphere
@@ -222,7 +219,6 @@ contains
       call advance()
       a(n) = -block%blocks%v(3, 1)/dt
     end do
-    print '(a, 3f8.4)', 'sphere between the cells: a/g ', a/g
     call check('sphere: the same wherever it lies', maxval(a)/minval(a) - 1.0_wp, 0.0_wp, 0.01_wp)
   end subroutine wherever_it_lies
 
@@ -251,8 +247,6 @@ contains
     call check('momentum '//name//': the water took some', norm2(motion) > 0.05_wp)
     call check('momentum '//name//': fluid and block keep it', after(2:3), before(2:3), &
                rest*block%blocks%mass(1)*norm2(motion))
-    print '(a, 3es10.2)', 'momentum '//name//': gained over exchanged ', &
-      (after - before)/(block%blocks%mass(1)*norm2(motion))
     call check('momentum '//name//': something is late', &
                late > 1.0e-5_wp*block%blocks%mass(1)*norm2(motion))
     call check('momentum '//name//': a ten-thousandth at most', &

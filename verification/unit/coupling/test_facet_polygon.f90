@@ -1,10 +1,9 @@
 !> Flat polygons cut along grid planes: pieces that fill the whole, lines that meet, shared ends.
 module test_facet_polygon_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use vectors_m, only: cross
   use facet_polygon_m, only: polygon_t, clip_to_cells, cut_by_plane, cells_between, &
     centres_between, value_on_line, point_at
-  use check_m, only: check
   implicit none
   private
   public :: test_facet_polygon

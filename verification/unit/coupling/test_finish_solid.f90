@@ -1,13 +1,12 @@
 !> Faces and cells that two bodies share, and links that round-off left open, made by hand.
 module test_finish_solid_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces
   use links_on_grid_m, only: links_t, links_on_grid, no_hit
   use voxels_m, only: voxels_t, voxels_init
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_finish_solid

@@ -1,10 +1,8 @@
 !> The density of the mixture holds the mass of fluid and bodies.
 module test_mass_average_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use mass_average_m, only: density_of_mixture
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, slip
   implicit none
   private
   public :: test_mass_average

@@ -1,8 +1,7 @@
 !> What the flow knows of the blocks: inertia turned into space, who is moved, and how far a force
 !! moves them.
 module test_push_bodies_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use errors_m, only: to_text
   use vectors_m, only: quaternion_from_axis
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init

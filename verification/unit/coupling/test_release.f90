@@ -1,10 +1,9 @@
 !> Release of blocks: due or not, room or not, the time of the next one.
 module test_release_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use rigid_body_m, only: blocks_t
   use release_m, only: release_due_blocks, next_release, n_pending
   use world_m, only: world_t, set_up
-  use check_m, only: check
   implicit none
   private
   public :: test_release

@@ -1,9 +1,8 @@
 !> Prisms under facets and areas under lines, with first moments, against integrals done by hand.
 module test_share_moments_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use facet_polygon_m, only: polygon_t
   use share_moments_m, only: along, up, turn, add_prism, add_end, add_piece, add_above
-  use check_m, only: check
   implicit none
   private
   public :: test_share_moments
@@ -24,21 +23,16 @@ contains
   function polygon(x) result(p)
     real(wp), intent(in) :: x(:, :)   !! from the corner of the cell
     type(polygon_t) :: p
-    integer :: v
 
     p%n = size(x, 2)
-    do v = 1, p%n
-      p%x(:, v) = corner + x(:, v)
-    end do
+    p%x(:, :p%n) = spread(corner, 2, p%n) + x
   end function polygon
 
   !> A square at height 1/4, seen from above; from below it takes the same away.
   subroutine prism_of_a_flat_top()
     real(wp) :: x(3, 4), total(7)
 
-    x(1, :) = [0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp]
-    x(2, :) = [0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp]
-    x(3, :) = 0.25_wp
+    x = reshape([0, 0, 1, 4, 0, 1, 4, 4, 1, 0, 4, 1]*0.25_wp, [3, 4])
     total = 0.0_wp
     call add_prism(polygon(x), corner, total)
     call check('volume, moments, column', total, [0.25_wp, 0.125_wp, 0.125_wp, 1/32.0_wp, &

@@ -1,8 +1,7 @@
 !> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, links, pockets,
 !! periods.
 module test_solid_fraction_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use case_types_m, only: shape_input_t
   use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
   use random_counter_m, only: uniform, random_rotation

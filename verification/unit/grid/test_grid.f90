@@ -1,11 +1,10 @@
 !> Kinds of sides, and which cells and faces lie at them, outside the domain or with this process.
 module test_grid_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use boundary_kinds_m, only: no_side, side_no_slip, side_slip, side_open, side_periodic, &
     side_inflow, side_outflow, side_code, side_names, is_wall, gives_pressure, gives_velocity, drags
   use grid_m, only: grid_t
   use case_text_m, only: grid_of
-  use check_m, only: check
   implicit none
   private
   public :: test_grid

@@ -1,12 +1,11 @@
 !> Density and viscosity of the fluid by its liquid share, and the two means on faces.
 module test_mixture_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t, flow_init
   use mixture_m, only: mix_fluid, face_mean, harmonic_mean
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_mixture

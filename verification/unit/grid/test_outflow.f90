@@ -1,12 +1,11 @@
 !> What lies outside an outflow: columns at rest, the level, the part that yields to a wave.
 module test_outflow_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: grid_input_t, boundary_input_t, fluid_t
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use outflow_m, only: outflow_init, start_outflow, update_outflow, outside_distance, &
     pressure_outside, mean_velocity
-  use check_m, only: check
   implicit none
   private
   public :: test_outflow

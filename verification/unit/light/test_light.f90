@@ -1,7 +1,6 @@
 !> Blocks in a given water: buoyancy and level, added mass, entry, drag, the books.
 module test_light_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use errors_m, only: to_text
   use rigid_body_m, only: release_body, begin_step, drift, kick, own_mass, kinetic_energy, &
     potential_energy
@@ -71,18 +70,22 @@ contains
     text = body('cube', [0.05_wp, 0.05_wp, z], v, q, more)
   end function at
 
-  !> A step without contact.
-  subroutine step(dt, world)
+  !> n steps without contact.
+  subroutine step(n, dt, world)
+    integer, intent(in) :: n
     real(wp), intent(in) :: dt
     type(world_t), intent(inout) :: world
+    integer :: i
 
     associate (blocks => world%blocks)
-      call enter_water(gravity, dt, blocks, world%initialised, world%light)
-      call begin_step(blocks)
-      call drift(0.5_wp*dt, blocks)
-      call kick(gravity, dt, blocks%fluid_force, blocks%fluid_torque, blocks)
-      call drift(0.5_wp*dt, blocks)
-      call store_water_force(gravity, dt, blocks, world%light)
+      do i = 1, n
+        call enter_water(gravity, dt, blocks, world%initialised, world%light)
+        call begin_step(blocks)
+        call drift(0.5_wp*dt, blocks)
+        call kick(gravity, dt, blocks%fluid_force, blocks%fluid_torque, blocks)
+        call drift(0.5_wp*dt, blocks)
+        call store_water_force(gravity, dt, blocks, world%light)
+      end do
     end associate
   end subroutine step
 
@@ -158,7 +161,7 @@ contains
     real(wp) :: want
 
     call start(s*rho, world, [0.07_wp])
-    call step(dt, world)
+    call step(1, dt, world)
     want = -(s - 1.0_wp)*g/(s + world%light%added(1)%mass)
     call check('start of a fall', world%blocks%v(3, 1)/dt/want, 1.0_wp, 1.0e-5_wp)
     call check('M dU/dt is the sum of forces', own_mass(world%blocks, 1)*(world%blocks%v(3, 1)/dt &
@@ -172,13 +175,10 @@ contains
     type(world_t) :: world
     real(wp), parameter :: s = 2.3_wp
     real(wp) :: want
-    integer :: i
 
     call start(s*rho, world, bodies=at(-1.0_wp, q=quaternion_from_axis([1.0_wp, 2.0_wp, 0.5_wp], &
       0.7_wp)))
-    do i = 1, 4000
-      call step(min(1.0e-3_wp, step_in_water(gravity, world%blocks, world%light)), world)
-    end do
+    call step(4000, min(1.0e-3_wp, step_in_water(gravity, world%blocks, world%light)), world)
     want = sqrt(2.0_wp*(s - 1.0_wp)*g*edge**3/(0.55_wp*2.0_wp*edge**2))
     call check('terminal speed', -world%blocks%v(3, 1)/want, 1.0_wp, 1.0e-3_wp)
     call check('straight down', norm2(world%blocks%v(1:2, 1)) < 1.0e-6_wp*want)
@@ -187,24 +187,18 @@ contains
   !> A block of half the density at half draught, in balance.
   subroutine check_floating()
     type(world_t) :: world
-    integer :: i
 
     call start(0.5_wp*rho, world, [level])
-    do i = 1, 1000
-      call step(1.0e-3_wp, world)
-    end do
+    call step(1000, 1.0e-3_wp, world)
     call check('floats at half draught', world%blocks%x(3, 1), level, 1.0e-12_wp)
   end subroutine check_floating
 
   !> A block as heavy as the water, let go in it.
   subroutine check_neutral()
     type(world_t) :: world
-    integer :: i
 
     call start(rho, world, [0.07_wp])
-    do i = 1, 1000
-      call step(1.0e-2_wp, world)
-    end do
+    call step(1000, 1.0e-2_wp, world)
     call check('a neutral block stays', world%blocks%x(3, 1), 0.07_wp, 1.0e-13_wp)
   end subroutine check_neutral
 
@@ -237,19 +231,16 @@ contains
   subroutine check_let_go()
     type(world_t) :: world
     real(wp), parameter :: speed = -0.1_wp
-    integer :: i
 
     call start(2300.0_wp, world, bodies=at(level + 0.5_wp*edge, [0.0_wp, 0.0_wp, speed], &
       more='fixed=T'))
-    do i = 1, 10
-      call step(1.0e-2_wp, world)
-    end do
+    call step(10, 1.0e-2_wp, world)
     call check('it is half in the water', world%light%wet(1) > 0.3_wp*edge**3 .and. &
                world%light%wet(1) < 0.6_wp*edge**3)
     call check('a crane moves the block alone', &
       world%blocks%mass(1)/own_mass(world%blocks, 1), 1.0_wp, 1.0e-15_wp)
     world%blocks%fixed = .false.
-    call step(1.0e-9_wp, world)
+    call step(1, 1.0e-9_wp, world)
     call check('let go it carries water', world%blocks%mass(1) > 1.05_wp*own_mass(world%blocks, 1))
     call check('and has kept its speed', world%blocks%v(3, 1)/speed, 1.0_wp, 0.02_wp)
   end subroutine check_let_go
@@ -259,15 +250,12 @@ contains
     type(world_t) :: world
     real(wp), parameter :: spin = 5.0_wp
     real(wp) :: grown
-    integer :: i
 
     call start(rho, world, bodies=at(0.07_wp, more='angular_velocity=0,0,5'))
     call enter(gravity, world)
-    call step(1.0e-9_wp, world)
+    call step(1, 1.0e-9_wp, world)
     call check('release keeps the spin', world%blocks%omega(3, 1)/spin, 1.0_wp, 1.0e-6_wp)
-    do i = 1, 400
-      call step(1.0e-3_wp, world)
-    end do
+    call step(400, 1.0e-3_wp, world)
     call check('drag brakes it', world%blocks%omega(3, 1) < 0.9_wp*spin .and. &
       world%blocks%omega(3, 1) > 0.0_wp)
     grown = 1.0_wp + world%light%added(1)%inertia
@@ -275,10 +263,10 @@ contains
     world%blocks%l(3, 1) = spin*grown*world%blocks%shapes(1)%inertia(3, 3)
     world%blocks%x(3, 1) = level + edge
     call enter(gravity, world)
-    call step(1.0e-9_wp, world)
+    call step(1, 1.0e-9_wp, world)
     call check('leaving keeps it', world%blocks%omega(3, 1)/spin, 1.0_wp, 1.0e-6_wp)
     world%blocks%x(3, 1) = 0.07_wp
-    call step(1.0e-9_wp, world)
+    call step(1, 1.0e-9_wp, world)
     call check('entry shares it', world%blocks%omega(3, 1)*grown/spin, 1.0_wp, 1.0e-6_wp)
   end subroutine check_spin
 
@@ -290,16 +278,14 @@ contains
 
     call start(1.5_wp*rho, world, bodies=at(0.12_wp, [0.1_wp, 0.0_wp, 0.3_wp], &
       more='angular_velocity=3,2,5'), shape=' drag_coefficient=0')
-    call step(1.0e-12_wp, world)
+    call step(1, 1.0e-12_wp, world)
     first = energy(world)
-    do i = 1, 50
-      call step(1.0e-3_wp, world)
-    end do
+    call step(50, 1.0e-3_wp, world)
     call check('energy under water stays', energy(world)/first, 1.0_wp, 1.0e-12_wp)
     call start(0.9_wp*rho, world, [level - 0.35_wp*edge])   ! at rest at -0.4
     largest = 0.0_wp
     do i = 1, 1000
-      call step(1.0e-2_wp, world)
+      call step(1, 1.0e-2_wp, world)
       if (i > 500) largest = max(largest, abs(world%blocks%x(3, &
         1) - world%light%level + 0.4_wp*edge))
     end do
@@ -317,12 +303,9 @@ contains
   !> A current takes a block along; one that enters keeps its share of it.
   subroutine check_current()
     type(world_t) :: world
-    integer :: i
 
     call start(rho, world, [0.07_wp], velocity=' velocity=.2,0,0')
-    do i = 1, 20000
-      call step(1.0e-3_wp, world)
-    end do
+    call step(20000, 1.0e-3_wp, world)
     call check('neutral: with the current', world%blocks%v(1, 1)/0.2_wp, 1.0_wp, 2.0e-2_wp)
     call check('and no other way', norm2(world%blocks%v(2:3, 1)) < 1.0e-12_wp)
   end subroutine check_current
@@ -346,12 +329,9 @@ contains
   !> What a restart file does not hold follows from what it holds, to the bit.
   subroutine check_resumed()
     type(world_t) :: world, again
-    integer :: i
 
     call start(2300.0_wp, world, [level + 0.4_wp*edge])
-    do i = 1, 30
-      call step(1.0e-3_wp, world)
-    end do
+    call step(30, 1.0e-3_wp, world)
     call begin(world%case, world, again)
     again%blocks%x = world%blocks%x
     again%blocks%q = world%blocks%q
@@ -363,10 +343,8 @@ contains
     again%light%force = world%light%force
     again%initialised = world%initialised
     call resume_light(again%blocks, again%light)
-    do i = 1, 30
-      call step(1.0e-3_wp, world)
-      call step(1.0e-3_wp, again)
-    end do
+    call step(30, 1.0e-3_wp, world)
+    call step(30, 1.0e-3_wp, again)
     call check('a restart goes on as it would have', all(abs(again%blocks%v - world%blocks%v) &
       <= 0.0_wp) .and. all(abs(again%blocks%fluid_force - world%blocks%fluid_force) <= 0.0_wp))
     call check('in the middle of an entry', world%light%wet(1) > 0.0_wp)

@@ -1,11 +1,11 @@
 !> Open part of a cell that a box cuts: volumes below planes and in slabs against the exact ones.
 module test_cut_cell_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use solid_geometry_m, only: solid_geometry_t
+  use box_solid_m, only: set_tetrahedra
   use plic_m, only: unit_volume, unit_slab
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below, open_constant, &
                         open_slab_below
-  use check_m, only: check
   implicit none
   private
   public :: test_cut_cell
@@ -29,24 +29,12 @@ contains
   subroutine set_box(a, b, solid)
     real(wp), intent(in) :: a(3), b(3)
     type(solid_geometry_t), intent(inout) :: solid
-    integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, &
-                                               2, 1, 3, 1, 3, 2], [3, 6])
-    integer :: t, v
-    real(wp) :: x(3)
+    integer :: t
 
-    solid%tets%n = 6
-    allocate (solid%tets%corner(3, 4, 6), solid%tets%first(2), solid%tets%list(6))
+    allocate (solid%tets%corner(3, 4, 6))
+    call set_tetrahedra(reshape(low + h*a, [3, 1]), reshape(low + h*b, [3, 1]), solid)
     solid%tets%first = [1, 7]
-    do t = 1, 6
-      x = a
-      solid%tets%list(t) = t
-      solid%tets%corner(:, 1, t) = low + h*x
-      do v = 1, 3
-        x(path(v, t)) = b(path(v, t))
-        solid%tets%corner(:, v + 1, t) = low + h*x
-      end do
-      if (t > 3) solid%tets%corner(:, [1, 2], t) = solid%tets%corner(:, [2, 1], t)   ! volume > 0
-    end do
+    solid%tets%list = [(t, t=1, 6)]
   end subroutine set_box
 
   subroutine box_in_cell(a, b, name)

@@ -1,7 +1,7 @@
 !> C^ of full cells: one value in a row of level water whatever stands in it; sealed cells keep
 !! their own.
 module test_extended_fraction_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: fluid_t, water_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
@@ -10,7 +10,6 @@ module test_extended_fraction_m
                                  liquid_share
   use liquid_fill_m, only: fill_liquid
   use box_solid_m, only: simple_grid, set_boxes
-  use check_m, only: check
   implicit none
   private
   public :: test_extended_fraction
@@ -39,8 +38,7 @@ contains
     call simple_grid([9, 8, 8], [0.9_wp, 0.8_wp, 0.8_wp], grid)
     call flow_init(grid, flow)
     call solid_geometry_init(grid, solid)
-    call set_boxes(grid, reshape([0.23_wp, 0.22_wp, 0.31_wp], [3, 1]), &
-                   reshape([0.65_wp, 0.61_wp, 0.66_wp], [3, 1]), solid)
+    call set_boxes(grid, [0.23_wp, 0.22_wp, 0.31_wp], [0.65_wp, 0.61_wp, 0.66_wp], solid)
     fluid%water_level = level
     call extended_fraction_init(fluid%gravity, extension)
     call fill_liquid(grid, fluid, [water_t ::], solid, flow)

@@ -1,6 +1,6 @@
 !> Initial liquid and the rise of the surface when a block appears: exact volumes, level surfaces.
 module test_liquid_fill_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: fluid_t, water_t
   use polyhedron_m, only: tet_moments_below
   use grid_m, only: grid_t
@@ -10,13 +10,14 @@ module test_liquid_fill_m
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use liquid_fill_m, only: fill_liquid, raise_surface, liquid_volume
   use box_solid_m, only: set_boxes, simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_liquid_fill
 
   integer, parameter :: cells(3) = [16, 12, 20]
   real(wp), parameter :: tank(3) = [0.16_wp, 0.06_wp, 0.2_wp]   !! cells are not cubes [m]
+  real(wp), parameter :: low_m(3) = [0.0333_wp, 0.0222_wp, 0.0444_wp]    !! of a solid box [m]
+  real(wp), parameter :: high_m(3) = [0.0777_wp, 0.0333_wp, 0.0888_wp]
   real(wp), parameter :: up(3) = [0.0_wp, 0.0_wp, 1.0_wp]
 
   type(grid_t) :: grid
@@ -102,11 +103,8 @@ contains
   !> Two boxes of liquid that overlap, cut by a solid.
   subroutine boxes_around_a_solid()
     type(water_t) :: water(2)
-    real(wp) :: low(3, 1), high(3, 1)
 
-    low(:, 1) = [0.0333_wp, 0.0222_wp, 0.0444_wp]
-    high(:, 1) = [0.0777_wp, 0.0333_wp, 0.0888_wp]
-    call set_boxes(grid, low, high, after)
+    call set_boxes(grid, low_m, high_m, after)
     water(1) = water_t([0.0111_wp, 0.0_wp, 0.0_wp], [0.0666_wp, 0.06_wp, 0.0666_wp])
     water(2) = water_t([0.0555_wp, 0.0255_wp, 0.0_wp], [0.1_wp, 0.06_wp, 0.1_wp])
     call fill_liquid(grid, fluid_t(), water, after, flow)
@@ -115,30 +113,28 @@ contains
       0.0345_wp, 0.0666_wp]) - product([0.0333_wp, 0.0111_wp, 0.0222_wp]) - product([0.0222_wp, &
       0.0078_wp, 0.0444_wp]) + product([0.0111_wp, 0.0078_wp, 0.0222_wp]), 1.0e-17_wp)
     call check('room is the open volume', sum(flow%fluid_volume(1:16, 1:12, 1:20)), product(tank) &
-               - product(high - low), 1.0e-16_wp)
+               - product(high_m - low_m), 1.0e-16_wp)
   end subroutine boxes_around_a_solid
 
   !> A box appears in still water: the surface is as high as it must be, and level.
-  subroutine box_appears(level, box_low, box_high, name)
-    real(wp), intent(in) :: level, box_low(3), box_high(3)
+  subroutine box_appears(level, low, high, name)
+    real(wp), intent(in) :: level, low(3), high(3)
     character(*), intent(in) :: name
-    real(wp) :: low(3, 1), high(3, 1), rest, new_level, volume, foot
+    real(wp) :: rest, new_level, volume, foot
     integer :: k
 
     call still(level)
-    low(:, 1) = box_low
-    high(:, 1) = box_high
     call set_boxes(grid, low, high, after)
     call raise_surface(grid, before, after, extension, flow, rest)
     volume = liquid_volume(grid, flow%liquid)
     call check(name//': volume', volume/flow%liquid_initial, 1.0_wp, 1.0e-14_wp)
     call check(name//': all of it found a place', rest, 0.0_wp)
     call check(name//': each row has one C^', spread_of_rows(), 0.0_wp, 1.0e-12_wp)
-    foot = product(box_high(1:2) - box_low(1:2))
-    if (box_high(3) > level) then   ! the new surface still cuts the box
-      new_level = (volume - foot*box_low(3))/(tank(1)*tank(2) - foot)
+    foot = product(high(1:2) - low(1:2))
+    if (high(3) > level) then   ! the new surface still cuts the box
+      new_level = (volume - foot*low(3))/(tank(1)*tank(2) - foot)
     else
-      new_level = (volume + foot*(box_high(3) - box_low(3)))/(tank(1)*tank(2))
+      new_level = (volume + foot*(high(3) - low(3)))/(tank(1)*tank(2))
     end if
     k = grid%cell_of(new_level, 3)
     call check(name//': new level', flow%c(16, 12, k), (new_level - grid%face(k, 3))/grid%h(3), &
@@ -179,14 +175,12 @@ contains
 
   !> Liquid everywhere: what the box displaces leaves the tank and is booked.
   subroutine no_surface()
-    real(wp) :: low(3, 1), high(3, 1), rest
+    real(wp) :: rest
 
     call still()
-    low(:, 1) = [0.0333_wp, 0.0222_wp, 0.0444_wp]
-    high(:, 1) = [0.0777_wp, 0.0333_wp, 0.0888_wp]
-    call set_boxes(grid, low, high, after)
+    call set_boxes(grid, low_m, high_m, after)
     call raise_surface(grid, before, after, extension, flow, rest)
-    call check('single phase: displaced', rest, product(high - low), 1.0e-17_wp)
+    call check('single phase: displaced', rest, product(high_m - low_m), 1.0e-17_wp)
     call check('single phase: all liquid', flow%liquid - flow%fluid_volume, 0.0_wp)
     call check('single phase: balance', liquid_volume(grid, flow%liquid) - flow%liquid_initial &
                - flow%liquid_inflow, 0.0_wp, 1.0e-17_wp)

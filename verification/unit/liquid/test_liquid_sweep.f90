@@ -1,13 +1,12 @@
 !> One sweep: the slabs below a level surface, what sides bring, and the balance of the cells.
 module test_liquid_sweep_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use boundary_kinds_m, only: side_inflow, side_outflow
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_liquid_sweep
@@ -90,15 +89,10 @@ contains
                close)
     call check('outflow', volumes%g(5, 2, 1:4, 1), -0.2_wp*[1.0_wp, 1.0_wp, 0.4_wp, 0.0_wp], close)
     sweeps%incoming = 0.5_wp
-    call start_side()
+    volumes%q = 0.0_wp
+    volumes%q(:, :, 7, 3) = -0.1_wp   ! in through the open top
+    call sweep_volumes(grid, solid, 3, volumes, sweeps)
     call check('an open side', volumes%g(2, 2, 7, 3), -0.05_wp, close)
   end subroutine through_sides
-
-  !> Fluid comes in through the open top.
-  subroutine start_side()
-    volumes%q = 0.0_wp
-    volumes%q(:, :, 7, 3) = -0.1_wp
-    call sweep_volumes(grid, solid, 3, volumes, sweeps)
-  end subroutine start_side
 
 end module test_liquid_sweep_m

@@ -1,7 +1,7 @@
 !> Transport of the liquid: exact volumes, bounds, moving boxes, parted basins. Still water is a
 !! case of that name.
 module test_liquid_transport_m
-  use kinds_m, only: wp, pi
+  use check_m, only: check, checked, wp, pi
   use case_types_m, only: fluid_t, water_t
   use boundary_kinds_m, only: side_slip
   use grid_m, only: grid_t
@@ -15,7 +15,6 @@ module test_liquid_transport_m
   use solid_fraction_m, only: update_solid
   use one_body_m, only: one_body_t, place_body => place
   use box_solid_m, only: set_boxes, simple_grid
-  use check_m, only: check, checked
   implicit none
   private
   public :: test_liquid_transport
@@ -29,6 +28,7 @@ module test_liquid_transport_m
   type(solid_geometry_t) :: old, new
   type(flow_t) :: flow
   type(liquid_transport_t) :: transport
+  real(wp) :: nothing(3, 0)
   real(wp) :: room, bound, drift   !! largest errors since `start` [V], [V], [-]
 
 contains
@@ -84,7 +84,7 @@ contains
     edge = half
     if (present(grown)) edge = half + grown
     old = new
-    call set_boxes(grid, reshape(centre - edge, [3, 1]), reshape(centre + edge, [3, 1]), new)
+    call set_boxes(grid, centre - edge, centre + edge, new)
     call carry(step, 0.01_wp, old, new)
   end subroutine carry_box
 
@@ -113,7 +113,6 @@ contains
     call check(name//': volume at every step', drift, 0.0_wp, 1.0e-13_wp)
     call check(name//': bounds', bound, 0.0_wp, 1.0e-12_wp)
     call check(name//': room follows', room, 0.0_wp, 2.0e-12_wp)
-    print '(a, 3es9.2)', name//': drift, bounds, room error ', drift, bound, room
   end subroutine check_books
 
   !> Liquid that is in one field but not in the other [m3].
@@ -129,7 +128,6 @@ contains
   !> A ball of liquid goes once around a periodic domain, cells not cubes.
   subroutine ball_in_uniform_stream(steps, subcycles)
     integer, intent(in) :: steps, subcycles   !! of the turn, of each step
-    real(wp) :: nothing(3, 0)
     integer :: i, j, k
 
     call start([24, 16, 20], spread(0.24_wp, 1, 3), .not. walls, nothing, nothing, -1.0_wp, &
@@ -164,7 +162,6 @@ contains
     call check(name//': volume', drift, 0.0_wp, 1.0e-14_wp)
     call check(name//': bounds', bound, 0.0_wp, 1.0e-15_wp)
     call check(name//': shape after one turn', error < 0.05_wp)
-    print '(a, es9.2)', name//': share of the liquid in the wrong place ', error
   end subroutine one_turn
 
   !> Share of a ball of radius 0.06 m in the middle, by points.
@@ -179,7 +176,7 @@ contains
 
   !> A block of liquid in solid rotation about the y axis.
   subroutine column_in_rotation()
-    real(wp) :: nothing(3, 0), x(2)
+    real(wp) :: x(2)
     integer :: i, k
 
     call start([32, 4, 32], [0.32_wp, 0.04_wp, 0.32_wp], [.false., .true., .false.], nothing, &
@@ -264,7 +261,6 @@ contains
   subroutine hexapod_through_the_surface()
     type(one_body_t) :: block
     type(solid_geometry_t) :: before
-    real(wp) :: nothing(3, 0)
     integer :: step
 
     call start(tank_cells, tank, walls, nothing, nothing, 0.1013_wp, [water_t ::])

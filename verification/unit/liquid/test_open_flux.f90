@@ -1,6 +1,6 @@
 !> Volumes through the faces that fit a moving body, in every cell of the narrow band around it.
 module test_open_flux_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use boundary_kinds_m, only: side_slip
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
@@ -9,7 +9,6 @@ module test_open_flux_m
   use open_flux_m, only: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
   use random_counter_m, only: uniform
   use box_solid_m, only: simple_grid, set_boxes
-  use check_m, only: check
   implicit none
   private
   public :: test_open_flux
@@ -62,7 +61,7 @@ contains
     call check('no way out: the rest is left alone', any(flux%band%marked(1:8, 1:9, 1:10) == 0))
 
     call start(.true.)
-    call set_box([0.15_wp, -1.0_wp, -1.0_wp], [0.65_wp, 2.0_wp, 2.0_wp], old)
+    call set_boxes(grid, [0.15_wp, -1.0_wp, -1.0_wp], [0.65_wp, 2.0_wp, 2.0_wp], old)
     call find_flux(old)
     call check('side by side: two parts', flux%band%parts, 2)
     associate (x => flux%band%cell(1, :), first => flux%band%first)
@@ -79,17 +78,10 @@ contains
     call fit_to_bodies(grid, old, after, flow%fluid_volume, solver, flux, q)
   end subroutine find_flux
 
-  subroutine set_box(from, to, solid)
-    real(wp), intent(in) :: from(3), to(3)   !! [m]
-    type(solid_geometry_t), intent(inout) :: solid
-
-    call set_boxes(grid, reshape(from, [3, 1]), reshape(to, [3, 1]), solid)
-  end subroutine set_box
-
   !> A box on the floor whose top sinks by 0.01 m, in fluid at rest.
   subroutine stand_on_floor()
-    call set_box([0.1_wp, 0.2_wp, -1.0_wp], [0.6_wp, 0.7_wp, 0.46_wp], old)
-    call set_box([0.1_wp, 0.2_wp, -1.0_wp], [0.6_wp, 0.7_wp, 0.45_wp], new)
+    call set_boxes(grid, [0.1_wp, 0.2_wp, -1.0_wp], [0.6_wp, 0.7_wp, 0.46_wp], old)
+    call set_boxes(grid, [0.1_wp, 0.2_wp, -1.0_wp], [0.6_wp, 0.7_wp, 0.45_wp], new)
     flow%fluid_volume = grid%volume*(1.0_wp - old%alpha)
     flow%uf = 0.0_wp
   end subroutine stand_on_floor
@@ -105,11 +97,11 @@ contains
     call solid_geometry_init(grid, old)
     call solid_geometry_init(grid, new)
     if (closed) then
-      call set_box([-1.0_wp, -1.0_wp, 0.15_wp], [2.0_wp, 2.0_wp, 0.85_wp], old)
-      call set_box([-1.0_wp, -1.0_wp, 0.15_wp], [2.0_wp, 2.0_wp, 0.86_wp], new)
+      call set_boxes(grid, [-1.0_wp, -1.0_wp, 0.15_wp], [2.0_wp, 2.0_wp, 0.85_wp], old)
+      call set_boxes(grid, [-1.0_wp, -1.0_wp, 0.15_wp], [2.0_wp, 2.0_wp, 0.86_wp], new)
     else
-      call set_box(low, high, old)
-      call set_box(low + move, high + move, new)
+      call set_boxes(grid, low, high, old)
+      call set_boxes(grid, low + move, high + move, new)
     end if
     call open_flux_init(grid, flux)
     call elliptic_solver_init(grid, solver)

@@ -1,9 +1,8 @@
 !> The plane in a box cell: constant and volume are inverse, slabs add up, normals of planes are
 !! exact.
 module test_plic_m
-  use kinds_m, only: wp, pi
+  use check_m, only: check, wp, pi
   use plic_m, only: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
-  use check_m, only: check
   implicit none
   private
   public :: test_plic

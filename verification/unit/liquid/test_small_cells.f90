@@ -1,13 +1,12 @@
 !> Small cells: who they are, what they give and that nothing gets lost.
 module test_small_cells_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
                            renew_shares
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_small_cells

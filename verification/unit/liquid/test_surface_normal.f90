@@ -1,16 +1,18 @@
 !> Normal of the surface: level water, nothing to see, and a wall that hides what lies behind it.
 module test_surface_normal_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use surface_normal_m, only: vertical_t, vertical_of, surface_normal, passable
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_surface_normal
 
   real(wp), parameter :: up(3) = [0.0_wp, 0.0_wp, 1.0_wp]
+  type(grid_t) :: grid
+  type(solid_geometry_t) :: solid
+  real(wp), allocatable :: c(:, :, :)
   integer, parameter :: level = 4   !! layer of cells that the surface passes
 
 contains
@@ -36,25 +38,19 @@ contains
   end subroutine verticals
 
   !> Shares of water with a level surface, halo included.
-  subroutine still_water(grid, solid, c)
-    type(grid_t), intent(out) :: grid
-    type(solid_geometry_t), intent(out) :: solid
-    real(wp), allocatable, intent(out) :: c(:, :, :)
-
+  subroutine still_water()
     call simple_grid([8, 6, 7], [0.8_wp, 0.6_wp, 0.7_wp], grid)
     call solid_geometry_init(grid, solid)
-    allocate (c, source=solid%alpha)
+    if (.not. allocated(c)) allocate (c, source=solid%alpha)
+    c = 0.0_wp
     c(:, :, :level - 1) = 1.0_wp
     c(:, :, level) = 0.3_wp
   end subroutine still_water
 
   subroutine level_water()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: solid
     type(vertical_t) :: vertical
-    real(wp), allocatable :: c(:, :, :)
 
-    call still_water(grid, solid, c)
+    call still_water()
     vertical = vertical_of(-up)
     call check('level', surface_normal(grid, solid, vertical, c, 4, 3, level), up)
     call check('upside down', surface_normal(grid, solid, vertical, 1.0_wp - c, 4, 3, level), -up)
@@ -64,12 +60,9 @@ contains
 
   !> Water stands higher behind a closed plane of faces; with one open face more it is seen.
   subroutine hidden_water()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: solid
-    real(wp), allocatable :: c(:, :, :)
     real(wp) :: normal(3)
 
-    call still_water(grid, solid, c)
+    call still_water()
     c(5:, :, :) = 1.0_wp
     solid%aperture(5, :, :, 1) = 0.0_wp
     solid%alpha(5, 3, level) = 0.5_wp
@@ -81,12 +74,9 @@ contains
 
   !> Near a body the last cell repeats outside the domain, whatever stands in the halo.
   subroutine sides_of_domain()
-    type(grid_t) :: grid
-    type(solid_geometry_t) :: solid
-    real(wp), allocatable :: c(:, :, :)
     real(wp) :: normal(3)
 
-    call still_water(grid, solid, c)
+    call still_water()
     c(9:, :, :) = 1.0_wp
     c(7, :, level) = 0.5_wp
     solid%alpha(8, 3, level - 1) = 0.5_wp

@@ -1,7 +1,7 @@
 !> The implicit predictor: amplification of waves at any Courant number, its limit for short steps,
 !> balance, uniform velocity, and the viscous stage as the part without advection.
 module test_c_ismac_m
-  use kinds_m, only: wp, pi
+  use check_m, only: check, wp, pi
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use boundary_m, only: fill_velocity_halo
@@ -14,7 +14,6 @@ module test_c_ismac_m
                                 advected_velocity
   use one_body_m, only: one_body_t, place
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_c_ismac
@@ -40,7 +39,6 @@ contains
     call balance()
     call uniform_velocity()
     call part_of_advection()
-    call order_of_accuracy()
     call without_advection()
   end subroutine test_c_ismac
 
@@ -137,8 +135,6 @@ contains
     call check('energy never grows', decays)
     call check('mean stays', total(1), mean, 1.0e-7_wp*real(n, wp))
     call check('no overshoot', maxval(abs(flow%u(1:n, 1, 1, 2:3))) < 1.0_wp)
-    print '(a, f4.1, a, 2f8.4)', 'Courant number ', courant, ': energy left of sine and jump ', &
-      energy/[real(n, wp)/2, 12.0_wp]
   end subroutine long_run
 
   !> Sum of a power of the transverse velocities.
@@ -227,35 +223,6 @@ contains
     call advected_velocity(grid, flow%rho, 1.0e-2_wp, viscous, predictor, part)
     call check('part of advection', part(1:16, 2, 2, 3), flow%u(1:16, 2, 2, 3), 1.0e-8_wp)
   end subroutine part_of_advection
-
-  !> A sine wave over half a period: first order in the step, which the grid follows.
-  subroutine order_of_accuracy()
-    real(wp) :: error(3)
-    integer :: m
-
-    error = [(wave_error(16*2**m), m=1, 3)]
-    print '(a, 3es10.2)', 'smooth wave at Courant number 1/4: errors at 32, 64, 128 cells ', error
-    call check('order in the step', log(error(2)/error(3))/log(2.0_wp), 1.0_wp, 0.1_wp)
-    ! The leading error is a diffusivity (a - 1/2) u^2 dt; over half a period it takes
-    ! 1 - exp(-(2 pi)^2 (a - 1/2) C h/2) of the wave, whose mean height is 2/pi.
-    call check('size of the error', error(3), 2.0_wp/pi*(1.0_wp - exp(-(2.0_wp*pi)**2 &
-      *(implicit_share - 0.5_wp)*0.25_wp/(2.0_wp*128.0_wp))), 0.1_wp*error(3))
-  end subroutine order_of_accuracy
-
-  !> Mean error of a sine wave after half a period at a Courant number of 1/4.
-  real(wp) function wave_error(n) result(error)
-    integer, intent(in) :: n
-    real(wp) :: sine(n)
-    integer :: i
-
-    call start([n, 1, 1], 1, 'tvd5')
-    sine = [(sin(2.0_wp*pi*(i - 0.5_wp)/n), i=1, n)]
-    flow%u(1:n, 1, 1, 2) = sine
-    do i = 1, 2*n
-      call step(0.25_wp, 1)
-    end do
-    error = sum(abs(flow%u(1:n, 1, 1, 2) + sine))/n
-  end function wave_error
 
   !> Without advection the predictor is the viscous stage, with a free body, wall links and small
   !! cells.

@@ -1,16 +1,14 @@
 !> What the transport gets of half a step of weight and pressure, which cells get it, how much
 !! momentum that is, and what the cells get after it.
 module test_half_kick_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: n_halo
   use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole
   use advected_pressure_m, only: advect_pressure
   use mixture_m, only: mix_fluid, mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration
   use merged_cells_m, only: merged_cells_t
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place, random_field
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, random_field, slip
   implicit none
   private
   public :: test_half_kick

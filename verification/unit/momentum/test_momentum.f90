@@ -1,6 +1,6 @@
 !> Transport of momentum: uniform velocity, balance, order of accuracy, moving boxes.
 module test_momentum_m
-  use kinds_m, only: wp, pi
+  use check_m, only: check, wp, pi
   use case_types_m, only: fluid_t, water_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
@@ -16,7 +16,6 @@ module test_momentum_m
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
     momentum_implicit
   use box_solid_m, only: set_boxes, simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_momentum
@@ -29,6 +28,7 @@ module test_momentum_m
   type(flow_t) :: flow
   type(liquid_transport_t) :: transport
   type(momentum_t) :: momentum
+  real(wp) :: nothing(3, 0)
   type(fluid_t) :: fluid
 
 contains
@@ -127,7 +127,6 @@ contains
   !> A uniform velocity carried by another, sheared flow through boxes of liquid stays.
   subroutine uniform_through_an_interface(subcycles)
     integer, intent(in) :: subcycles   !! of each step
-    real(wp) :: nothing(3, 0)
     integer :: step, d
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
@@ -146,7 +145,7 @@ contains
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.
   subroutine momentum_of_a_period()
-    real(wp) :: nothing(3, 0), before(3), after(3), scale
+    real(wp) :: before(3), after(3), scale
     integer :: i, j, k, step
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
@@ -157,13 +156,13 @@ contains
     end do
     call fill_velocity_halo(grid, flow%u)
     before = total_momentum()
-    scale = total_mass()
+    scale = sum(mass())
     do step = 1, 6
       call carry(2.5e-3_wp, step)
     end do
     after = total_momentum()
     call check('momentum of a period', after, before, 1.0e-14_wp*scale)
-    call check('mass of a period', total_mass(), scale, 1.0e-14_wp*scale)
+    call check('mass of a period', sum(mass()), scale, 1.0e-14_wp*scale)
   end subroutine momentum_of_a_period
 
   function total_momentum() result(p)
@@ -171,33 +170,31 @@ contains
     integer :: d
 
     associate (n => grid%n)
-      do d = 1, 3
-        p(d) = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
-          flow%liquid(1:n(1), 1:n(2), 1:n(3)))*flow%u(1:n(1), 1:n(2), 1:n(3), d))
-      end do
+      p = [(sum(mass()*flow%u(1:n(1), 1:n(2), 1:n(3), d)), d=1, 3)]
     end associate
   end function total_momentum
 
-  real(wp) function total_mass() result(m)
+  !> Mass of the fluid in each cell [kg].
+  function mass()
+    real(wp) :: mass(grid%n(1), grid%n(2), grid%n(3))
 
     associate (n => grid%n)
-      m = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
-                           flow%liquid(1:n(1), 1:n(2), 1:n(3))))
+      mass = mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
+        flow%liquid(1:n(1), 1:n(2), 1:n(3)))
     end associate
-  end function total_mass
+  end function mass
 
   !> A box dips into liquid, moves sideways and leaves through the open top; cells open and close,
   !! the fluid keeps its velocity.
   subroutine boxes_in_uniform_fluid()
     real(wp), parameter :: half(3) = [0.033_wp, 0.027_wp, 0.0318_wp]
-    real(wp) :: low(3, 1), high(3, 1), centre(3), worst
+    real(wp) :: centre(3), worst, angle
     integer :: step, d, small
 
     fluid%water_level = 0.1013_wp
     centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
-    low(:, 1) = centre - half
-    high(:, 1) = centre + half
-    call start([16, 12, 20], [0.16_wp, 0.12_wp, 0.2_wp], sideways, [water_t ::], low, high)
+    call start([16, 12, 20], [0.16_wp, 0.12_wp, 0.2_wp], sideways, [water_t ::], &
+      reshape(centre - half, [3, 1]), reshape(centre + half, [3, 1]))
     do d = 1, 3
       flow%u(:, :, :, d) = stream(d)
     end do
@@ -205,12 +202,10 @@ contains
     worst = 0.0_wp
     small = 0
     do step = 1, 20
-      call set_boxes(grid, low, high, old)
-      centre(3) = 0.15_wp - 0.05_wp*sin(2.0_wp*pi*real(step, wp)/20.0_wp)
-      centre(1) = 0.0771_wp + 0.01_wp*sin(4.0_wp*pi*real(step, wp)/20.0_wp)
-      low(:, 1) = centre - half
-      high(:, 1) = centre + half
-      call set_boxes(grid, low, high, new)
+      call set_boxes(grid, centre - half, centre + half, old)
+      angle = 2.0_wp*pi*real(step, wp)/20.0_wp
+      centre = [0.0771_wp + 0.01_wp*sin(2*angle), 0.0613_wp, 0.15_wp - 0.05_wp*sin(angle)]
+      call set_boxes(grid, centre - half, centre + half, new)
       call carry(0.01_wp, step)
       worst = max(worst, deviation(1.0e-9_wp))
       do d = 1, 3   ! the velocity stage gives closed cells the velocity of the body
@@ -220,7 +215,6 @@ contains
     end do
     call check('uniform velocity around a moving box', worst, 0.0_wp, 1.0e-9_wp)
     call check('cells opened and closed', small > 0)
-    print '(a, es9.2)', 'moving box: largest change of a uniform velocity ', worst
     fluid = fluid_t()
   end subroutine boxes_in_uniform_fluid
 
@@ -230,7 +224,6 @@ contains
 
     coarse = wave_error(16, 0.25_wp)
     fine = wave_error(32, 0.25_wp)
-    print '(a, 2es10.2)', 'smooth wave: errors at 16 and 32 cells ', coarse, fine
     call check('second order', coarse/fine > 3.8_wp)
     call check('error at 32 cells', fine < 8.0e-3_wp)
   end subroutine order_of_accuracy
@@ -239,7 +232,7 @@ contains
   real(wp) function wave_error(n, courant) result(error)
     integer, intent(in) :: n
     real(wp), intent(in) :: courant
-    real(wp) :: nothing(3, 0), dt, exact(n)
+    real(wp) :: dt, exact(n)
     integer :: i, step, steps
 
     fluid%single_phase = .true.
@@ -265,7 +258,7 @@ contains
   !> With 'upwind' a face carries the value of its donor: u_i := (1 - C) u_i + C u_(i-1).
   subroutine donor_value()
     real(wp), parameter :: courant = 0.3_wp
-    real(wp) :: nothing(3, 0), before(0:16)
+    real(wp) :: before(0:16)
 
     fluid%single_phase = .true.
     call start([16, 4, 4], [1.0_wp, 0.25_wp, 0.25_wp], everywhere, [water_t ::], nothing, nothing)

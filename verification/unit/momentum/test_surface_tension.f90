@@ -1,7 +1,7 @@
 !> Curvature from heights and its force at the faces, against surfaces of known curvature.
 ! ranks: 2 3
 module test_surface_tension_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
@@ -12,9 +12,7 @@ module test_surface_tension_m
                                force_from_tension
   use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use box_solid_m, only: simple_grid, set_boxes
-  use case_text_m, only: sides
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, sides
   implicit none
   private
   public :: test_surface_tension
@@ -194,8 +192,7 @@ contains
     integer :: k
 
     call start(cells)
-    call set_boxes(grid, reshape([0.5_wp, -1.0_wp, -1.0_wp], [3, 1]), &
-                   reshape([0.58_wp, 2.0_wp, 2.0_wp], [3, 1]), solid)
+    call set_boxes(grid, [0.5_wp, -1.0_wp, -1.0_wp], [0.58_wp, 2.0_wp, 2.0_wp], solid)
     do k = grid%lo(3), grid%hi(3)
       c(:7, :, k) = min(max((0.53_wp - grid%face(k, 3))/grid%h(3), 0.0_wp), 1.0_wp)
       c(8:, :, k) = min(max((0.47_wp - grid%face(k, 3))/grid%h(3), 0.0_wp), 1.0_wp)

@@ -1,9 +1,8 @@
 !> Fifth-order values: exact weights on smooth data, order, bounds, monotony of a step.
 module test_tvd_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use tvd_m, only: face_row, tvd_scheme, mp_scheme
-  use check_m, only: check
   implicit none
   private
   public :: test_tvd

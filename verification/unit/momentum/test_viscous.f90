@@ -2,16 +2,14 @@
 !! waves that decay.
 module test_viscous_m
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use kinds_m, only: wp, pi
+  use check_m, only: check, wp, pi
   use errors_m, only: to_text
   use rigid_motion_m, only: set_inertia
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_links_m, only: build_viscous
   use merged_cells_m, only: merged_cells_t
   use viscous_m, only: solve_viscous, force_of_links
-  use case_text_m, only: sides, slip, body
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, sides, slip, body
   implicit none
   private
   public :: test_viscous

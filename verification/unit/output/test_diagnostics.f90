@@ -1,7 +1,7 @@
 !> The sums over the fluid in a row of results: what a cell holds counts, not what its level would
 !! have it hold.
 module test_diagnostics_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_types_m, only: case_t
   use case_text_m, only: case_of
   use grid_m, only: grid_init
@@ -10,7 +10,6 @@ module test_diagnostics_m
   use run_state_m, only: run_state_t
   use diagnostics_m, only: step_report_t, quantity_t, make_row, value_of, measure_fluid, &
     energy_of_level
-  use check_m, only: check
   implicit none
   private
   public :: test_diagnostics

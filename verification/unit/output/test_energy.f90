@@ -1,12 +1,10 @@
 !> The book of energy: what a step makes is found, what a release puts in is not, when it is known.
 module test_energy_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use energy_m, only: energy_t, energy_parts_t, energy_init, put_in_energy, store_energy, &
     energy_excess
-  use case_text_m, only: sides
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, sides
   implicit none
   private
   public :: test_energy

@@ -2,16 +2,16 @@
 ! ranks: 2 3
 module test_hdf5_file_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use kinds_m, only: wp, sp, i8
+  use check_m, only: check, wp, sp, i8
   use parallel_m, only: is_root, nproc, my_rank, global_max
   use hdf5_file_m, only: h5_file_t
   use table_m, only: table_t, creating, reopening, appending
-  use check_m, only: check
   implicit none
   private
   public :: test_hdf5_file
 
   character(*), parameter :: path = 'test_hdf5_file.h5'
+  integer, parameter :: layers = 12   !! of a dataset that all processes share
 
 contains
 
@@ -34,6 +34,14 @@ contains
     open (newunit=unit, file=name, iostat=info)
     if (info == 0) close (unit, status='delete')
   end subroutine remove
+
+  !> An empty file of the root process.
+  subroutine fresh(file)
+    type(h5_file_t), intent(inout) :: file
+
+    call remove(path)
+    call file%create(path, .false.)
+  end subroutine fresh
 
   !> No error so far; otherwise the error is shown.
   subroutine check_file(name, file)
@@ -59,8 +67,7 @@ contains
 
     if (.not. is_root()) return
     long = repeat('&body position = 0.1, 0.2, 0.3 /'//new_line('a'), 5000)   ! more than 64 kB
-    call remove(path)
-    call file%create(path, .false.)
+    call fresh(file)
     call file%group('/provenance')
     call file%attribute('/provenance', 'namelist', long)
     call file%attribute('/provenance', 'empty', '')
@@ -89,8 +96,7 @@ contains
 
     if (.not. is_root()) return
     a = reshape([(1.0_wp/i, i=1, 6)], [2, 3])
-    call remove(path)
-    call file%create(path, .false.)
+    call fresh(file)
     call file%store('/a', 'm', [a], shape(a))
     call file%store('/n', '1', [5, 6, 7, 8])
     call file%store('/nothing', 'm', [real(wp) ::])
@@ -136,8 +142,7 @@ contains
     integer :: step, touched(22), cells(33)
 
     if (.not. is_root()) return
-    call remove(path)
-    call table%file%create(path, .false.)
+    call fresh(table%file)
     table%chunk_bytes = 64
     call list_columns(0, creating, table)
     do step = 1, 11
@@ -172,16 +177,21 @@ contains
     call table%file%close()
   end subroutine test_columns
 
+  subroutine own_layers(first, last)
+    integer, intent(out) :: first, last
+
+    first = 1 + (layers*my_rank())/nproc()
+    last = (layers*(my_rank() + 1))/nproc()
+  end subroutine own_layers
+
   !> All processes write their layers of one dataset; what is read does not depend on their number.
   subroutine test_shared_blocks()
     type(table_t) :: table
-    integer, parameter :: layers = 12
     real(wp) :: mine(2*layers), all_of_it(2*layers), x(2*layers)
     real(sp) :: single(2*layers)
     integer :: first, last, i
 
-    first = 1 + (layers*my_rank())/nproc()
-    last = (layers*(my_rank() + 1))/nproc()
+    call own_layers(first, last)
     mine = [(sqrt(real(i, wp)), i=1, 2*layers)]
     call remove(path)
     call meet()
@@ -222,17 +232,14 @@ contains
   !> All processes together go on in a file that one process began.
   subroutine test_go_on_together()
     type(table_t) :: table
-    integer, parameter :: layers = 12
     real(sp) :: a(layers)
     real(wp) :: x(layers)
     integer :: first, last, i
 
-    first = 1 + (layers*my_rank())/nproc()
-    last = (layers*(my_rank() + 1))/nproc()
+    call own_layers(first, last)
     a = [(sqrt(real(i, sp)), i=1, layers)]
     if (is_root()) then
-      call remove(path)
-      call table%file%create(path, .false.)
+      call fresh(table%file)
       do i = 0, 3
         call table%begin(merge(creating, appending, i == 0))
         call table%field('/field', 'm', [layers], [1], [layers], -a)
@@ -266,8 +273,7 @@ contains
     logical :: grew
 
     if (.not. is_root()) return
-    call remove(path)
-    call table%file%create(path, .false.)
+    call fresh(table%file)
     too_large = 0
     grew = .false.
     place = 1.0_wp
@@ -310,8 +316,7 @@ contains
     call file%open(path, .false., .false.)
     call check('a file of another kind is an error', file%info /= 0)
     call file%close()
-    call remove(path)
-    call file%create(path, .false.)
+    call fresh(file)
     call file%read('/series/time', x)
     call check('none is named', file%info /= 0 .and. index(file%message, '/series/time') > 0)
     call file%close()

@@ -1,14 +1,13 @@
 !> Restart files: the state comes back bit by bit, damage and a changed case are noticed.
 ! ranks: 2 3
 module test_restart_m
-  use kinds_m, only: wp, i8
+  use check_m, only: check, checked, wp, i8
   use parallel_m, only: is_root, nproc, broadcast
   use restart_m, only: write_restart, read_restart
   use state_m, only: list_state
   use state_list_m, only: state_list_t
   use file_space_m, only: bytes_for_change
   use sample_state_m, only: sample_t, make_sample, checksums_of, first_change
-  use check_m, only: check, checked
   implicit none
   private
   public :: test_restart

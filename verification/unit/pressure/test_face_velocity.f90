@@ -1,16 +1,14 @@
 !> Faces beside a moving box: how long their Rhie-Chow acceleration counts, and that what is normal
 !! to the wall goes linearly from the velocity of the cell to that of the wall.
 module test_face_velocity_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: n_halo, unit_step
   use boundary_m, only: fill_velocity_halo
   use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use merged_cells_m, only: merged_cells_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place, random_field
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, random_field, slip
   implicit none
   private
   public :: test_face_velocity

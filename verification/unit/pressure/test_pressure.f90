@@ -1,6 +1,6 @@
 !> Projection around held and free blocks, hydrostatic balance, pressure in closed cells.
 module test_pressure_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use vectors_m, only: quaternion_from_axis
   use grid_m, only: n_halo, unit_step
   use mixture_m, only: mix_fluid, face_mean
@@ -15,9 +15,7 @@ module test_pressure_m
   use pressure_extension_m, only: extend_pressure
   use advected_pressure_m, only: advect_pressure
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use case_text_m, only: sides, body
-  use one_body_m, only: one_body_t, place, random_field
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, random_field, sides, body
   implicit none
   private
   public :: test_pressure

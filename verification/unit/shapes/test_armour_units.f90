@@ -1,7 +1,6 @@
 !> Tetrapod, dolos and cylinder: published proportions, symmetry, closed surfaces.
 module test_armour_units_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use vectors_m, only: cross, quaternion_from_axis
   use rotations_m, only: rotate
   use tet_mesh_m, only: shape_t
@@ -35,7 +34,7 @@ contains
 
     call build_tetrapod(1.0_wp, refinement, s)
     n = 6*refinement
-    tip = highest(s)
+    tip = maxval(s%point(3, :))
     angle = 2*pi/n
     root = 0.235_wp*sqrt(angle/sin(angle))   ! n triangles root^2/2 sin(angle) make up the circle
     call check('tetrapod: height', tip - minval(s%point(3, :)), 1.0_wp, 1.0e-15_wp)
@@ -87,13 +86,6 @@ contains
     call check_net('cylinder', s%point, s%facet, s%facet_point, 2)
     call check('cylinder: faces', size(s%facet) - 1, 2 + 6*refinement)
   end subroutine check_cylinder
-
-  !> Highest point.
-  pure real(wp) function highest(s)
-    type(shape_t), intent(in) :: s
-
-    highest = maxval(s%point(3, :))
-  end function highest
 
   !> Area of the facet that lies at a height.
   pure real(wp) function area_above(s, height) result(area)

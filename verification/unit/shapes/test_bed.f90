@@ -1,8 +1,7 @@
 !> The bed: its file, its volume in cells and faces, distances.
 module test_bed_m
   use, intrinsic :: iso_fortran_env, only: real32, int32
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use rotations_m, only: rotate
   use case_types_m, only: case_t
   use case_text_m, only: case_of, slip
@@ -10,6 +9,7 @@ module test_bed_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use links_on_grid_m, only: links_t, links_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use plic_m, only: unit_volume
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
   use shapes_builtin_m, only: make_shape
   use tet_mesh_m, only: shape_t
@@ -128,7 +128,7 @@ contains
   !! side faces likewise.
   subroutine volume_of_slope()
     type(cut_cell_t) :: cut
-    real(wp) :: worst(4), height(3)
+    real(wp) :: worst(5), height(3), at
     integer :: i, j, m
 
     call sloping_tank()
@@ -151,11 +151,15 @@ contains
         worst(3) = max(worst(3), abs(sum(solid%alpha(i, j, 1:9))*grid%h(3) - height(3)))
         call check('centres inside', all((solid%inside(i, j, 1:9) == 1) &
           .eqv. grid%centre([(m, m=1, 9)], 3) < height(3)))
+        at = dot_product(slope, [grid%face(i, 1), grid%face(j, 2), 1.0_wp])
+        worst(5) = max(worst(5), maxval(abs(solid%aperture(i, j, 1:9, 3) &
+          - [(unit_volume([slope(:2)*grid%h(:2), 0.0_wp], grid%face(m, 3) - at), m=1, 9)])))
       end do
     end do
     call check('height of the columns of faces and cells', worst(:3), 0.0_wp, 1.0e-15_wp)
     call check('its tetrahedra fill the cut cells', worst(4), 0.0_wp, 1.0e-13_wp)
     call check('there are many', solid%n_cut > 50)
+    call check('faces in z, below the line of the slope', worst(5), 0.0_wp, 1.0e-12_wp)
   end subroutine volume_of_slope
 
   !> A hexapod as a bed, closed and overhanging, fills the grid as the same hexapod does as a body:

@@ -1,7 +1,6 @@
 !> Volume of a bed below a level: slopes, closed forms, overhangs.
 module test_bed_measure_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: case_t
   use bed_file_m, only: bed_form_t
   use bed_m, only: bed_t, set_bed

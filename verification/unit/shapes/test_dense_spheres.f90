@@ -1,8 +1,7 @@
 !> Dense contact spheres: each is the largest that touches its face where it does and stays inside,
 !! up to two spacings, in wedges and between parallel faces where that is known.
 module test_dense_spheres_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: cross
   use tet_mesh_m, only: shape_t
   use dense_spheres_m, only: place_densely

@@ -1,7 +1,6 @@
 !> Two edges that cross: depth, normal, weight, and how the weight changes with position.
 module test_edge_crossing_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use vectors_m, only: rotation_matrix, quaternion_from_axis
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope, turn_before, way_apart
   implicit none

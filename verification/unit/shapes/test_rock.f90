@@ -1,7 +1,6 @@
 !> Stones: convex, of given mass, elongation and blockiness, and graded after Rosin and Rammler.
 module test_rock_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: shape_input_t
   use vectors_m, only: cross
   use tet_mesh_m, only: shape_t

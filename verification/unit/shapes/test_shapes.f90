@@ -1,7 +1,6 @@
 !> The built-in shapes: closed conforming meshes, symmetry, contact spheres, messages.
 module test_shapes_m
-  use kinds_m, only: wp, pi
-  use check_m, only: check
+  use check_m, only: check, wp, pi
   use case_types_m, only: shape_input_t
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_volume

@@ -1,8 +1,8 @@
 !> Flat regions joined to few convex polygons: one where they are convex, nets that stay closed
 !! around the same volume, and what edges know of their other sides.
 module test_surface_net_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
+  use grid_m, only: unit_step
   use surface_net_m, only: merge_flat_facets, edge_twins
   use surface_nets_m, only: check_net
   implicit none
@@ -29,12 +29,12 @@ contains
 
   !> A cuboid has six rectangles, whatever the net was.
   subroutine check_cuboid()
-    logical :: full(n, n, n)
+    logical :: full(0:n + 1, 0:n + 1, 0:n + 1)
     type(net_t) :: net
     integer :: k
 
     full = .false.
-    full(2:4, 1:2, :3) = .true.
+    full(2:4, 1:2, 1:3) = .true.
     do k = 1, 2
       call make_net(full, k == 2, net)
       call merge_flat_facets(net%point, net%facet, net%corner)
@@ -47,7 +47,7 @@ contains
   !> A block shaped like an L, three cubes: each of its two L needs two convex polygons at least;
   !! all are no more than its fourteen squares.
   subroutine check_corner()
-    logical :: full(n, n, n)
+    logical :: full(0:n + 1, 0:n + 1, 0:n + 1)
     type(net_t) :: net
     integer :: k
 
@@ -65,11 +65,11 @@ contains
 
   !> Eight cubes around a hole keep it; all polygons are fewer than the 32 squares.
   subroutine check_ring()
-    logical :: full(n, n, n)
+    logical :: full(0:n + 1, 0:n + 1, 0:n + 1)
     type(net_t) :: net
 
     full = .false.
-    full(:3, :3, 1) = .true.
+    full(1:3, 1:3, 1) = .true.
     full(2, 2, 1) = .false.
     call make_net(full, .true., net)
     call merge_flat_facets(net%point, net%facet, net%corner)
@@ -92,7 +92,7 @@ contains
   !> In a closed net every edge is the twin of its twin, which runs back. Where a square is missing
   !! its four neighbours have none, and where four squares meet at an edge none has.
   subroutine check_twins()
-    logical :: full(n, n, n)
+    logical :: full(0:n + 1, 0:n + 1, 0:n + 1)
     type(net_t) :: net
     integer, allocatable :: twin(:)
     integer :: e
@@ -118,7 +118,7 @@ contains
 
   !> The surface of cubes, a square for each free side or two triangles.
   subroutine make_net(full, triangles, net)
-    logical, intent(in) :: full(n, n, n), triangles
+    logical, intent(in) :: full(0:, 0:, 0:), triangles   !! none beyond 1..n
     type(net_t), intent(out) :: net
     integer :: i, j, k, d, s, c(4)
 
@@ -133,7 +133,8 @@ contains
           if (.not. full(i, j, k)) cycle
           do d = 1, 3
             do s = 0, 1
-              if (is_full(full, [i, j, k] + (2*s - 1)*unit(d))) cycle
+              c(:3) = [i, j, k] + (2*s - 1)*unit_step(:, d)
+              if (full(c(1), c(2), c(3))) cycle
               c = side([i, j, k], d, s)
               if (triangles) call add([c(1), c(2), c(3)], net)
               if (triangles) call add([c(1), c(3), c(4)], net)
@@ -158,29 +159,14 @@ contains
     integer, intent(in) :: cube(3), d, s   !! direction; 0: lower, 1: upper side
     integer :: c(4), corner(3), e, f
 
-    corner = cube - 1 + s*unit(d)
+    corner = cube - 1 + s*unit_step(:, d)
     e = 1 + modulo(d, 3)
     f = 1 + modulo(d + 1, 3)
-    c = [number(corner), number(corner + unit(e)), number(corner + unit(e) + unit(f)), &
-      number(corner + unit(f))]
+    associate (a => unit_step(:, e), b => unit_step(:, f))
+      c = [number(corner), number(corner + a), number(corner + a + b), number(corner + b)]
+    end associate
     if (s == 0) c = c([4, 3, 2, 1])
   end function side
-
-  pure logical function is_full(full, cube)
-    logical, intent(in) :: full(n, n, n)
-    integer, intent(in) :: cube(3)
-
-    is_full = all(cube >= 1 .and. cube <= n)
-    if (is_full) is_full = full(cube(1), cube(2), cube(3))
-  end function is_full
-
-  pure function unit(d) result(step)
-    integer, intent(in) :: d
-    integer :: step(3)
-
-    step = 0
-    step(d) = 1
-  end function unit
 
   pure integer function number(place)
     integer, intent(in) :: place(3)   !! from 0

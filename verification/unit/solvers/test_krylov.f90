@@ -3,7 +3,7 @@
 module test_krylov_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_invalid, &
     ieee_set_halting_mode, ieee_set_flag
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use errors_m, only: to_text
   use krylov_m, only: find_null_space, conjugate_gradient, bicgstab
@@ -12,7 +12,6 @@ module test_krylov_m
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use linear_systems_m, only: system_t, make_grid, set_random, complete
-  use check_m, only: check
   implicit none
   private
   public :: test_krylov

@@ -1,10 +1,9 @@
 !> The simple preconditioners: nothing, and the inverse of the diagonal.
 module test_linear_operator_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use linear_operator_m, only: jacobi_t, identity_t
   use box_solid_m, only: simple_grid
-  use check_m, only: check
   implicit none
   private
   public :: test_linear_operator

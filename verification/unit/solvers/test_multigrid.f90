@@ -3,7 +3,7 @@
 !! Prints a checksum of each solution, which `test_bits.py` compares between processes.
 ! ranks: 2 4
 module test_multigrid_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: grid_t
   use krylov_m, only: find_null_space, conjugate_gradient
   use solve_control_m, only: solve_control_t, solve_report_t, solved
@@ -13,7 +13,6 @@ module test_multigrid_m
   use checksum_m, only: checksum_t
   use parallel_m, only: set_threads, nproc, is_root, gather_all
   use linear_systems_m, only: system_t, make_grid, set_tank, set_random, complete
-  use check_m, only: check
   implicit none
   private
   public :: test_multigrid

@@ -1,13 +1,12 @@
 !> What the length of a step follows, and what the transport carries.
 module test_courant_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use case_text_m, only: grid_of
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_body_m, only: blocks_t
   use courant_m, only: courant_rate_t, courant_rate
-  use check_m, only: check
   implicit none
   private
   public :: test_courant

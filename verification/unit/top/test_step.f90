@@ -1,12 +1,11 @@
 !> Whole steps: water beside an outflow, a current, length of the step, a release, noise in gas.
 module test_step_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use errors_m, only: to_text
   use liquid_fill_m, only: liquid_volume
   use boundary_m, only: fill_scalar_halo
   use one_body_m, only: random_numbers
   use world_m, only: world_t, set_up, body, run
-  use check_m, only: check
   implicit none
   private
   public :: test_step
@@ -96,7 +95,7 @@ contains
     call check('moved block: speed', sim%blocks%v(:, 1) - rate, 0.0_wp)
     call check('moved: turned', sim%blocks%q(4, 1), sin(0.5_wp*spin(3)*sim%clock%t), 1.0e-14_wp)
     call check('moved: water', liquid_volume(sim%grid, sim%flow%liquid), before, 1.0e-13_wp*before)
-    call check('moved block: divergence', sim%report%divergence_max <= 1.0e-8_wp)
+    call check('moved block: divergence', sim%report%coupling%pressure%divergence <= 1.0e-8_wp)
     call check('moved block: feels the water', norm2(sim%blocks%fluid_force(:, 1)) > 0.1_wp)
   end subroutine moved_block
 
@@ -111,7 +110,9 @@ contains
       call tank('&grid cells=13,1,11 length=.12,.01,.12/ &boundary y_min="'//trim(kind(n)) &
         //'" y_max="'//trim(kind(n))//'"/ &water min=0,-1,0 max=.051,1,.083/', sim(n), fluid='')
       call run(sim(n), 10)
-      call check('solved', sim(n)%report%pressure_converged .and. sim(n)%report%viscous_converged)
+      associate (report => sim(n)%report%coupling)
+        call check('solved', report%pressure%converged .and. report%viscous_converged)
+      end associate
       call check('slice: water falls', minval(sim(n)%flow%u(1:13, 1, 1:11, 3)) < -0.02_wp)
       call check('slice: nothing across', sim(n)%flow%u(1:13, 1, 1:11, 2), 0.0_wp, 1.0e-15_wp)
       call check('slice: volume', liquid_volume(sim(n)%grid, sim(n)%flow%liquid), &
@@ -204,7 +205,6 @@ contains
     call fall_into_water(viscosity, noise, noisy)
     unit = noise*2.0_wp*1.5_wp*calm%clock%dt/calm%blocks%mass(1)
     change = norm2(noisy%blocks%v(:, 1) - calm%blocks%v(:, 1))
-    print '(a, f4.1, es10.2)', 'noise in gas: viscosity, change ', viscosity, change/unit
     call check('noise in gas: the block', change/unit, 0.0_wp, most)
     call check('noise in gas: there was some', change > 0.0_wp)
   end subroutine noise_in_gas
@@ -233,7 +233,9 @@ contains
     end do
     call fill_scalar_halo(sim%grid, sim%flow%p)
     call run(sim, 1)
-    call check('noise in gas', sim%report%pressure_converged .and. sim%report%viscous_converged)
+    associate (report => sim%report%coupling)
+      call check('noise in gas', report%pressure%converged .and. report%viscous_converged)
+    end associate
   end subroutine fall_into_water
 
 end module test_step_m

@@ -3,8 +3,7 @@
 !!
 !! The program calls itself with the choice to make as its argument: the call must fail.
 module test_unknown_names_m
-  use kinds_m, only: wp
-  use check_m, only: check
+  use check_m, only: check, wp
   use case_types_m, only: case_t, place_t
   use case_text_m, only: case_of
   use tet_mesh_m, only: shape_t

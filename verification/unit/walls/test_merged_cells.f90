@@ -2,14 +2,12 @@
 !! wall bears, a small cell moves between its target and the wall, what moves as one keeps moving as
 !! one.
 module test_merged_cells_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, find_merged_cells, is_unmerged, match_densities
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place, random_numbers, random_field
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, random_numbers, random_field, slip
   implicit none
   private
   public :: test_merged_cells

@@ -1,13 +1,11 @@
 !> Openings behind plane walls, which cut cells have an edge, and what a block holds in faces: at
 !! the edges of an upright box, and none of a sphere.
 module test_wall_edges_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use errors_m, only: to_text
   use wall_plane_m, only: apertures_of_plane
   use effective_aperture_m, only: more_inertia
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, slip
   implicit none
   private
   public :: test_wall_edges

@@ -1,13 +1,11 @@
 !> The layer at a wall: a line where it is thick, free slip where there is none; velocities at the
 !! centres of cut cells and the means over their fluid, above a box that moves.
 module test_wall_layer_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, find_merged_cells
   use wall_layer_m, only: find_slip, layer_slip, share_along, find_centres, to_centres
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place, wall_at, layer
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, wall_at, layer, slip
   implicit none
   private
   public :: test_wall_layer

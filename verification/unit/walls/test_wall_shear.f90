@@ -1,15 +1,13 @@
 !> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
 module test_wall_shear_m
-  use kinds_m, only: wp
+  use check_m, only: check, wp
   use wall_plane_m, only: distance_of_links
   use wall_layer_m, only: find_wall_speeds, rough_viscosity
   use viscous_links_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
   use merged_cells_m, only: merged_cells_t
   use rigid_motion_m, only: wall_velocity
-  use case_text_m, only: slip
-  use one_body_m, only: one_body_t, place
-  use check_m, only: check
+  use one_body_m, only: one_body_t, place, slip
   implicit none
   private
   public :: test_wall_shear
