@@ -34,6 +34,12 @@ LAWS: dict[str, Law] = {
     "mirror": (draw.world(("coupled", "fluid", "dry"), plain=True), symmetry.mirror),
     "turn": (draw.world(("coupled", "fluid", "dry"), plain="single"), symmetry.turn),
     "axes": (draw.world(("coupled", "fluid", "dry"), plain="single"), symmetry.axes),
+    "moved": (draw.world(), symmetry.moved),
+    "bodies": (draw.world(plain=True), symmetry.bodies),
+    "momentum": (
+        draw.world(("coupled",), True, ("sphere", "cube", "hexapod"), draw.ALONG_X),
+        balance.momentum,
+    ),
     "looks": (draw.world(), indifference.looks),
     "order": (draw.world(), indifference.order),
     "drops": (draw.world(("coupled", "dry", "light"), shapes=draw.MADE), indifference.drops),

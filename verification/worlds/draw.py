@@ -6,7 +6,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from worlds.world import Group, World
+from worlds.world import Group, Table, World
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 GRAVITY = 9.8125
@@ -23,6 +23,11 @@ REACH = {  # farthest point of a shape from its centre, over its size
 }
 EVEN = ("cube", "sphere", "box", "hexapod")
 """Shapes that are their own image in mirrors across their axes."""
+ALONG_X = dict.fromkeys((f"{d}_{s}" for d in "xyz" for s in ("min", "max")), "slip") | {
+    "x_min": "periodic",
+    "x_max": "periodic",
+}
+"""Sides that take no momentum along x."""
 MADE = tuple(kind for kind in REACH if kind != "rock")
 
 
@@ -215,10 +220,20 @@ def lying(draw: Draw) -> World:
 
 
 @st.composite
+def bed(draw: Draw, across: float, length: list[float]) -> Table:
+    """Heights of a floor that fits to itself where the tank is periodic, in words between blanks."""
+    heights = [[across * draw(number(0.0, 0.2)) for _ in range(3)] for _ in range(3)]
+    row = [4, 4, 0.0, 0.0, *(c / 3 for c in length[:2])]
+    row += [heights[j % 3][i % 3] for j in range(4) for i in range(4)]
+    return {"#" + " " * n: "m" for n in range(len(row))}, [row]
+
+
+@st.composite
 def body(
     draw: Draw, k: int, place: list[float], across: float, time: float, plain: bool
 ) -> tuple[str, Group]:
-    """Block k near a place, which is held, moved or free; if not `plain`, dropped or lowered."""
+    """Block k near a place, which is held, moved or free; if not `plain`, dropped or lowered, or
+    moved by a table of ways and turns, in its group until `world` takes it out."""
     speed, lazy = sqrt(GRAVITY * across), draw(number(0.0, 1.0))
     here = rounded([p + across * draw(around(0.05)) for p in place])
     found: Group = {"shape": f"s{k}", "position": here, "quaternion": draw(attitude())}
@@ -232,6 +247,12 @@ def body(
         return "drop", found
     if role == "moved":
         speed = 0.3 * across / time  # it stays in the gap around its place
+        if not plain and draw(st.booleans()):
+            far = rounded([h + 0.3 * across * draw(around(0.4)) for h in here])
+            q = found.pop("quaternion")
+            ways = [(0.0, here, q), (0.4, far, [c + draw(around(1.0)) for c in q]), (0.9, here, q)]
+            rows = [[t * time, *at, *turned] for t, at, turned in ways]
+            return "body", {**found, "fixed": True, "motion": rows}
     along = [speed * draw(around(s)) for s in (0.3, 0.3, 0.5)]
     if role == "dropped":
         found |= {"velocity": along, "first_time": lazy * time, "interval": time / 3}
@@ -256,7 +277,8 @@ def world(
     draw: Draw,
     kinds: tuple[str, ...] = ("coupled", "fluid", "dry", "light"),
     plain: bool | str = False,
-    shapes: tuple[str, ...] = tuple(REACH),
+    shapes: tuple[str, ...] = (),
+    ends: Group | None = None,
 ) -> World:
     """One to eight blocks of any kind in a tank with or without water. `plain`: there from the
     start, of shapes that are their own mirror image, the water in boxes; 'single': everywhere."""
@@ -264,13 +286,15 @@ def world(
     physics = draw(one_of(*kinds))
     cell = [across / draw(st.integers(4, 7)) * draw(number(1.0, a)) for a in (1.4, 0.7, 1.3)]
     places = [draw(st.integers(1, 2)) for _ in "xyz"]  # for a block each
-    ends = draw(sides())
+    ends = dict(ends or draw(sides()))
     wanted = [*room(across, ends, 1.2, places[:2]), 1.2 * across * (places[2] + 1)]
     cells, length = tank(wanted, cell)
     liquid = draw(fluid(across))
     dt = step(draw(number(0.05, 0.4)), liquid, cell)
     steps = draw(st.integers(4, 24))
-    run = {"physics": physics, "t_end": steps * dt, "dt": dt, "field_interval": 0.0,
+    run = {"physics": physics, "t_end": steps * dt, "dt": dt,
+           "history_interval": 0.0 if plain else draw(one_of(0.0, 2.5 * dt)),
+           "field_interval": 0.0 if plain else draw(one_of(0.0, 3.5 * dt)),
            "restart_interval": 0.0, "rest_speed": 1e-3 * sqrt(GRAVITY * across)}  # fmt: skip
     groups: list[tuple[str, Group]] = [
         ("run", run),
@@ -291,15 +315,35 @@ def world(
         groups.append(("water", {"min": [0.0, 0.0, 0.0], "max": [*length[:2], level]}))
     else:
         groups[3][1]["water_level"] = level
-    if draw(st.booleans()) and plain != "single":
+    special = "" if plain else draw(one_of("", "bed", "stream", "survey"))
+    if special == "stream" and physics in ("coupled", "fluid"):
+        current = [0.2 * sqrt(GRAVITY * across), 0.0, 0.0]
+        ends |= {"x_min": "inflow", "x_max": "outflow", "x_min_velocity": current}
+        groups[3][1]["velocity"] = current
+    elif draw(st.booleans()) and plain != "single":
         corner = rounded([c * draw(number(0.3, 0.7)) for c in length])
         groups.append(("water", {"min": [0.0, 0.0, 0.0], "max": [*corner[:2], 0.95 * length[2]]}))
+    tables: dict[str, Table] = {}
     slots = [
         (i, j, k) for k in range(places[2]) for j in range(places[1]) for i in range(places[0])
     ]
     for b, slot in enumerate(slots):
         place = [(s + 0.5) * c / n for s, c, n in zip(slot, length, places, strict=True)]
         place[2] = (slot[2] + 0.6) * 1.2 * across
-        groups.append(("shape", draw(shape(f"s{b}", across, EVEN if plain else shapes))))
-        groups.append(draw(body(b, place, across, run["t_end"], plain)))
-    return World(groups)
+        groups.append(
+            ("shape", draw(shape(f"s{b}", across, shapes or (EVEN if plain else tuple(REACH)))))
+        )
+        name, block = draw(body(b, place, across, run["t_end"], plain))
+        if "motion" in block:
+            units = {"time": "s", **dict.fromkeys("xyz", "m")}
+            units |= {f"q{c}": "" for c in "wxyz"}
+            tables[f"m{b}.csv"] = units, block["motion"]
+            block["motion"] = f"m{b}.csv"
+        groups.append((name, block))
+    if special == "bed":
+        tables["bed.txt"] = draw(bed(across, length))
+        groups.append(("bed", {"file": "bed.txt"}))
+    found = World(groups, tables)
+    if special != "survey":
+        return found
+    return found.shifted([across * draw(st.integers(-9, 9)), 3e5 * across, 5e6 * across])

@@ -38,6 +38,7 @@ def restart(world: World, folder: Path) -> None:
 def looks(world: World, folder: Path) -> None:
     """Rows and frames that are written more or less often."""
     t_end = world.value("run", "t_end")
+    world = world.changed("run", history_interval=0.0, field_interval=0.0)
     one = world.run(folder / "one")
     frames = world.changed("run", field_interval=0.3 * t_end).run(folder / "frames")
     same(one.folder, frames.folder, "&run field_interval", ("run.h5",))

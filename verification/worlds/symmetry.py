@@ -1,5 +1,7 @@
 """A world in a mirror, turned, or with its axes exchanged together with gravity."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,10 +89,19 @@ def product(a: list[float], b: list[float]) -> list[float]:
     return [a[0] * b[0] - v @ w, *(a[0] * w + b[0] * v + np.cross(v, w))]
 
 
-def same(world: World, folder: Path, q: Array, limit: float = ROUND_OFF) -> None:
-    """The first steps of both worlds agree to round-off, if the pressure is solved so far."""
+def same(
+    world: World,
+    folder: Path,
+    q: Array,
+    limit: float = ROUND_OFF,
+    change: Callable[[World, Array], World] = changed,
+    step: int = 1,
+) -> None:
+    """The first steps of both worlds, in which bodies follow in steps of `step`, agree to
+    round-off, if the pressure is solved so far."""
     world = world.changed("numerics", divergence_tolerance=1e-11)
-    one, other = world.run(folder / "one"), changed(world, q).run(folder / "other")
+    world = world.changed("run", history_interval=0.0)
+    one, other = world.run(folder / "one"), change(world, q).run(folder / "other")
     det = round(float(np.linalg.det(q)))
     rows = min(FEW + 1, len(one.series.time), len(other.series.time))
     g, h = float(np.linalg.norm(one.gravity)), float(one.grid.spacing.max())
@@ -102,7 +113,7 @@ def same(world: World, folder: Path, q: Array, limit: float = ROUND_OFF) -> None
     for name in (*POLAR, *AXIAL):
         sign = det if name in AXIAL else 1
         x = sign * getattr(one.bodies, name)[:rows] @ q.T
-        found[name] = far(x, getattr(other.bodies, name)[:rows], least[name])
+        found[name] = far(x, getattr(other.bodies, name)[:rows, ::step], least[name])
     for name, some in (("kinetic_energy_fluid", weight * h), ("liquid_volume", 0.0), ("time", 0.0)):
         numbers = (getattr(run.series, name)[:rows] for run in (one, other))
         found[name] = far(*numbers, some)
@@ -131,3 +142,23 @@ def turn(world: World, folder: Path) -> None:
 def axes(world: World, folder: Path) -> None:
     """Gravity along x, and all else with it."""
     same(world, folder, AXES)
+
+
+def moved(world: World, folder: Path) -> None:
+    """Somewhere else in a survey, where round-off is larger."""
+    across = world.value("grid", "length")[0]
+
+    def change(world: World, _: Array) -> World:
+        return world.shifted([37.0 * across, -21.0 * across, 5.0 * across])
+
+    same(world, folder, np.eye(3), change=change)
+
+
+def bodies(world: World, folder: Path) -> None:
+    """The last body first."""
+
+    def change(world: World, _: Array) -> World:
+        found = [group for group in world.groups if group[0] == "body"][::-1]
+        return replace(world, groups=[g for g in world.groups if g[0] != "body"] + found)
+
+    same(world, folder, np.eye(3), change=change, step=-1)
