@@ -221,7 +221,7 @@ def lying(draw: Draw) -> World:
 
 @st.composite
 def bed(draw: Draw, across: float, length: list[float]) -> Table:
-    """Heights of a floor that fits to itself where the tank is periodic, in words between blanks."""
+    """Heights of a floor that fits to itself where the tank is periodic, in one row of words."""
     heights = [[across * draw(number(0.0, 0.2)) for _ in range(3)] for _ in range(3)]
     row = [4, 4, 0.0, 0.0, *(c / 3 for c in length[:2])]
     row += [heights[j % 3][i % 3] for j in range(4) for i in range(4)]
