@@ -1,10 +1,18 @@
-"""Commands as a user gives them."""
+"""Commands and programs as a user calls them, and stand-ins for programs."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
 from micstools import cli
+
+ROOT = Path(__file__).parents[2]
+MICS = ROOT / "mics"
+needs_mics = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
 
 
 def mics_tools(words: Sequence[str]) -> int:
@@ -12,3 +20,27 @@ def mics_tools(words: Sequence[str]) -> int:
     with pytest.raises(SystemExit) as end:
         cli.main(list(words))
     return int(end.value.code or 0)
+
+
+def python(
+    *words: object, tools: Path = ROOT / "tools", **more
+) -> subprocess.CompletedProcess[str]:
+    """What Python says to these words, with the `tools` in its reach, on one thread."""
+    own = {**os.environ, "PYTHONPATH": str(tools), "OMP_NUM_THREADS": "1"}
+    usual = {"capture_output": True, "text": True, "timeout": 200, "env": own}
+    return subprocess.run([sys.executable, *map(str, words)], **usual | more)
+
+
+def plan_of(folder: Path, case: str) -> str:
+    """What `./mics --check` plans for a good case whose files lie in a folder."""
+    done = subprocess.run([MICS, "--check"], cwd=folder, input=case, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def program(path: Path, text: str) -> Path:
+    """A file that can be called."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+    return path

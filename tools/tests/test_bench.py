@@ -7,21 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from calls import MICS, needs_mics
 from micstools.bench import jobs, parts, table
 from micstools.bench.jobs import DAM, Job
 from micstools.bench.timing import Timing, timed
-from micstools.cases import program
 from micstools.reading.reader import BadRun
 
 
+@needs_mics
 def test_a_job_of_the_program(tmp_path: Path) -> None:
-    try:
-        path = program.find()
-    except BadRun:
-        pytest.skip("mics is not built")
     dam = replace(DAM, cells=(16, 1, 8), length=(0.6, 0.0375, 0.3), column=(0.15, 0.0375, 0.2),
                   seconds=0.02)  # fmt: skip
-    runs = [jobs.run(Job("dam", jobs.dam_break(dam)), (path, path), tmp_path)]
+    runs = [jobs.run(Job("dam", jobs.dam_break(dam)), (MICS, MICS), tmp_path)]
     found = parts.row("jobs", "dam_break", runs)
     assert found["size"] == 128 and found["simulated"] == pytest.approx(0.02)
     assert sum(found["phases"].values()) == pytest.approx(1.0, abs=1e-3)

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from calls import mics_tools
+from calls import MICS, mics_tools, needs_mics
 from micstools.cases import calibrate
 from micstools.cases.calibrate import Calibration, Fall
 from micstools.reading.reader import BadRun
 
-MICS = Path(__file__).parents[2] / "mics"
 CASE = """
 &run t_end = 1 /
 &grid cells = 1, 1, 1  length = 1, 1, 1 /
@@ -19,7 +18,7 @@ CASE = """
 """
 
 
-@pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+@needs_mics
 def test_finds_what_is_known(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

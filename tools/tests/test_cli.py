@@ -1,15 +1,13 @@
 """`mics-tools`: commands help, refuse wrong use in one line, and set variables of a case."""
 
-import os
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from calls import mics_tools
+from calls import mics_tools, python
+from calls import program as stand_in
 from micstools import cli
 from micstools.cases import program as program_of_tools
 from micstools.cases import settings
@@ -27,26 +25,14 @@ CASE = """\
 """
 
 
-def call(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "micstools.cli", *words],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "tools")},
-    )
-
-
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     """In place of mics: says how it was called and the case it got, refuses friction 9."""
-    path = tmp_path / "a program"
-    path.write_text(
+    return stand_in(
+        tmp_path / "a program",
         '#!/bin/sh\nread -r line\necho "$@: $line"\ngrep -q "friction = 9" && '
-        "{ echo 'mics: &contact friction = 9: too much' >&2; exit 2; }\nexit 0\n"
+        "{ echo 'mics: &contact friction = 9: too much' >&2; exit 2; }\nexit 0\n",
     )
-    path.chmod(0o755)
-    return path
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
@@ -168,10 +154,10 @@ def test_the_program_gets_the_case_as_set(tmp_path: Path, program: Path) -> None
     case = tmp_path / "my case.nml"
     case.write_text(CASE)
     words = ("check", case, "--program", program, "--set")
-    done = call(*words, "grid.cells=2,3,4")
+    done = python("-m", "micstools.cli", *words, "grid.cells=2,3,4")
     assert done.returncode == 0 and done.stdout.startswith("--check --plan ")
     assert done.stdout.endswith("/run.h5: ! A case with a / and a & in a remark\n")
-    done = call(*words, "contact.friction=9")
+    done = python("-m", "micstools.cli", *words, "contact.friction=9")
     assert (done.returncode, done.stderr) == (2, "mics: &contact friction = 9: too much\n")
 
 
@@ -180,18 +166,12 @@ def test_a_run_goes_on_and_keeps_its_time(tmp_path: Path, program: Path) -> None
     case.write_text(CASE)
     more = ("--restart", "mics-out/restart-a.h5", "--max-wall", "01:30", "--quiet")
     for settings_words in ((), ("--set", "grid.cells=2,3,4")):
-        done = call("run", case, "--program", program, *more, *settings_words)
+        done = python(
+            "-m", "micstools.cli", "run", case, "--program", program, *more, *settings_words
+        )
         said = done.stdout.split(":", 1)[0] if settings_words else done.stdout
         assert done.returncode == 0
         assert said.startswith("--restart mics-out/restart-a.h5 --max-wall 01"), done.stdout
-
-
-def place_program(path: Path) -> Path:
-    """A program at a path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("#!/bin/sh\nexit 0\n")
-    path.chmod(0o755)
-    return path
 
 
 def test_the_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,9 +184,9 @@ def test_the_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         program_of_tools.find(None, case)
     places = ("work/mics", "work/input/mics", "bin/mics", "nowhere/mics", "mine")
     for place in places[:4]:
-        found = place_program(tmp_path / place)
+        found = stand_in(tmp_path / place, "")
         assert program_of_tools.find(None, case) == found, place
-    monkeypatch.setenv("MICS", str(place_program(tmp_path / "mine")))
+    monkeypatch.setenv("MICS", str(stand_in(tmp_path / "mine", "")))
     assert program_of_tools.find(None, case) == tmp_path / "mine"
     assert program_of_tools.find(tmp_path / "bin/mics", case) == tmp_path / "bin/mics"
     monkeypatch.setenv("MICS", str(tmp_path / "gone"))

@@ -4,14 +4,15 @@ import os
 import subprocess
 from pathlib import Path
 
+from calls import program
+
 SCRIPT = Path(__file__).parents[1] / "cluster_job.sh"
 
 
 def call(work: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Call the script where `srun` only says how it was called."""
-    srun = work / "srun"
-    srun.write_text('#!/bin/sh\necho "$OMP_NUM_THREADS: $GOMP_SPINCOUNT $GLIBC_TUNABLES $*"\n')
-    srun.chmod(0o755)
+    said = "$OMP_NUM_THREADS: $GOMP_SPINCOUNT $GLIBC_TUNABLES $*"
+    program(work / "srun", f'#!/bin/sh\necho "{said}"\n')
     path = {"PATH": f"{work}:{os.environ['PATH']}", "SLURM_CPUS_PER_TASK": "2"}
     return subprocess.run(
         [SCRIPT, *words], cwd=work, capture_output=True, text=True, env={**os.environ, **path}

@@ -7,18 +7,17 @@ from pathlib import Path
 import h5py
 import pytest
 
+from calls import ROOT, python
 from micstools import command
 from micstools.reading.reader import BadRun, Run
 from synthetic import Motion, write_run
 
-ROOT = Path(__file__).parents[2]
 CASE = "&run t_end = 1.0 {0} /\n&grid cells = 1, 1, 1 length = 1.0, 1.0, 1.0 /\n"
 OF_RUNS = ("plot_pile", "plot_history", "plot_shape", "check_pile")
 
 
 def call(script: str, *words: str | Path, **more) -> subprocess.CompletedProcess[str]:
-    command_line = [sys.executable, ROOT / "tools" / f"{script}.py", *words]
-    return subprocess.run(command_line, capture_output=True, text=True, timeout=120, **more)
+    return python(ROOT / "tools" / f"{script}.py", *words, **more)
 
 
 def one_line(done: subprocess.CompletedProcess[str]) -> str:

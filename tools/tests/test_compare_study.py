@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from calls import mics_tools
+from calls import mics_tools, program
 from micstools.cases.convergence import converge
 from micstools.commands.study import finer
 from micstools.reading import comparison
@@ -143,17 +143,12 @@ sys.exit(code)
 def study_with(tmp_path: Path, broken: int = 0) -> list[str]:
     """The words of a study with a stand-in for the program, which ends with code 3 where there are
     so many cells."""
-    program, case = tmp_path / "mics", tmp_path / "case.nml"
-    tests = Path(__file__).parent
-    program.write_text(
-        PROGRAM.replace("{python}", sys.executable)
-        .replace("{tools!r}", repr(str(tests.parent)))
-        .replace("{tests!r}", repr(str(tests)))
-        .replace("{broken}", str(broken))
-    )
-    program.chmod(0o755)
+    case, tests = tmp_path / "case.nml", Path(__file__).parent
+    text = PROGRAM.replace("{broken}", str(broken)).replace("{tests!r}", repr(str(tests)))
+    text = text.replace("{tools!r}", repr(str(tests.parent))).replace("{python}", sys.executable)
+    path = program(tmp_path / "mics", text)
     case.write_text("&run t_end = 1.0 /\n&grid cells = 10, 10, 10 length = 1, 1, 1 /\n")
-    return ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out")]
+    return ["study", str(case), "--program", str(path), "--out", str(tmp_path / "out")]
 
 
 def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:

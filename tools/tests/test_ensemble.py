@@ -19,9 +19,9 @@ from pathlib import Path
 import h5py
 import pytest
 
-from calls import mics_tools
+from calls import MICS, mics_tools, needs_mics
+from calls import program as stand_in
 from micstools.cases import settings
-from micstools.cases.program import find as find_program
 from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
 from micstools.ensembles.ensemble import Plan
 from micstools.reading import shares
@@ -64,13 +64,11 @@ sys.exit(code)
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    path = tmp_path / "a mics"
-    seeds = {"no_room": ensemble.seed_of(1, 0), "fails": ensemble.seed_of(1, 1)}
-    path.write_text(PROGRAM.replace("{python}", sys.executable).replace(
-        "{no_room}", str(seeds["no_room"])).replace("{fails}", str(seeds["fails"])))  # fmt: skip
-    path.chmod(0o755)
+    text = PROGRAM.replace("{python}", sys.executable)
+    for index, name in enumerate(("{no_room}", "{fails}")):
+        text = text.replace(name, str(ensemble.seed_of(1, index)))
     (tmp_path / "case.nml").write_text(CASE)
-    return path
+    return stand_in(tmp_path / "a mics", text)
 
 
 def call(program: Path, *words: str) -> int:
@@ -162,12 +160,10 @@ with h5py.File(folder / "run.h5", "a") as h5:
 
 @pytest.fixture
 def piles(tmp_path: Path) -> Path:
-    path, here = tmp_path / "mics", Path(__file__).parent
-    folders = repr([str(here), str(here.parent)])
-    path.write_text(PILES.replace("{python}", sys.executable).replace("{folders}", folders))
-    path.chmod(0o755)
+    folders = repr([str(folder) for folder in Path(__file__).parents[:2]])
+    text = PILES.replace("{python}", sys.executable).replace("{folders}", folders)
     (tmp_path / "case.nml").write_text(CASE)
-    return path
+    return stand_in(tmp_path / "mics", text)
 
 
 def with_fields(folder: Path) -> list[str]:
@@ -288,21 +284,18 @@ def ctrl_c_counts() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@needs_mics
 @pytest.mark.cost(30)
 def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) -> None:
     """With the program itself: runs stopped on their way, then gone on with, against runs that
     were left alone, one after the other."""
-    try:
-        built = find_program()
-    except BadRun:
-        pytest.skip("mics is not built")
     (tmp_path / "blocks.nml").write_text(BLOCKS)
     stopped, whole = tmp_path / "stopped", tmp_path / "whole"
     assert "stopped; the same command goes on" in interrupted(stopped, 2)
     assert set(outcomes(stopped)) <= {"interrupted", "missing", "settled"}
     assert "interrupted" in outcomes(stopped)
     assert subprocess.run(ensemble_words(stopped, 2)).returncode == 0
-    assert subprocess.run([*ensemble_words(whole, 1), "--program", built]).returncode == 0
+    assert subprocess.run([*ensemble_words(whole, 1), "--program", MICS]).returncode == 0
     assert outcomes(whole) == ["settled"] * 3
     for name in ("ensemble.csv", "ensemble.json"):
         assert (stopped / name).read_bytes() == (whole / name).read_bytes()
@@ -329,11 +322,9 @@ kill -- -"$1"
 @pytest.fixture
 def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "queue"
-    folder.mkdir()
     for names, text in ((("sbatch", "qsub"), SUBMIT), (("scancel", "qdel"), CANCEL)):
         for name in names:
-            (folder / name).write_text(text.replace("{folder}", str(folder)))
-            (folder / name).chmod(0o755)
+            stand_in(folder / name, text.replace("{folder}", str(folder)))
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
     return folder
 
@@ -512,14 +503,13 @@ def test_only_a_bad_restart_file_throws_a_run_back(
     said: str, code: int, calls: list[str], tmp_path: Path
 ) -> None:
     """A disk that is full after hours is no reason to begin anew."""
-    program = tmp_path / "mics"
-    program.write_text(
+    program = stand_in(
+        tmp_path / "mics",
         f"#!{sys.executable}\nimport sys\nwords = sys.argv[1:]\n"
         f"open({str(tmp_path / 'calls')!r}, 'a').write("
         "words[words.index('--restart') + 1][-4] + ' ' if '--restart' in words else 'new ')\n"
-        f"print({said!r}, file=sys.stderr)\nsys.exit({code})\n"
+        f"print({said!r}, file=sys.stderr)\nsys.exit({code})\n",
     )
-    program.chmod(0o755)
     member = ensemble.Member(1, 1, (), CASE, tmp_path / "0001")
     member.result.mkdir(parents=True)
     for age, name in enumerate(("restart-b.h5", "restart-a.h5")):

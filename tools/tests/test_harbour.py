@@ -7,18 +7,16 @@ from pathlib import Path
 import f90nml
 import pytest
 
-from calls import mics_tools
+from calls import MICS, mics_tools, needs_mics, plan_of
 from micstools.cases import harbour
 from micstools.reading.reader import BadRun
-
-MICS = Path(__file__).parents[2] / "mics"
 
 
 def write(path: Path, *words: str) -> None:
     assert mics_tools(["harbour", "--out", str(path), *words]) == 0
 
 
-@pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+@needs_mics
 @pytest.mark.parametrize(
     ("words", "cells", "blocks", "memory"),
     [
@@ -31,14 +29,7 @@ def test_the_program_plans_memory_and_time(
 ) -> None:
     case = tmp_path / "harbour.nml"
     write(case, *words)
-    plan = subprocess.run(
-        [MICS, "--check", case],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=True,
-        cwd=tmp_path,
-    ).stdout
+    plan = plan_of(tmp_path, case.read_text())
     assert f"= {cells}\n" in plan
     assert re.search(rf"dropped +{blocks}, the last one at \d+ s", plan)
     assert re.search(r"time of the run +about [\d.]+ (hours|days|min)", plan)

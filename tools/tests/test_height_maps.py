@@ -1,9 +1,6 @@
 """Measured ground becomes a map of heights; what is missing or stands askew is refused."""
 
-import os
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -12,11 +9,10 @@ import pytest
 import rasterio
 from PIL import Image, TiffImagePlugin
 
-from calls import mics_tools
+from calls import mics_tools, needs_mics, plan_of, python
 from micstools.reading.reader import BadRun
 from micstools.shapes import height_maps
 
-ROOT = Path(__file__).parents[2]
 # From y_min to y_max, x in each row.
 Z = np.array(
     [[0.0, 1.0, 2.0, 3.0], [10.0, 11.0, 12.0, 13.0], [20.0, 21.0, 22.0, 23.0]]
@@ -354,6 +350,7 @@ def test_what_is_no_map_is_one_line(
     assert not (tmp_path / "bed.txt").exists()
 
 
+@needs_mics
 def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
     """A model at 1:50 of a part of the map, its gap filled, under a tank of 60 x 40 mm."""
     path = save(tmp_path / "a.asc", ESRI.replace("12", "-99"))
@@ -372,16 +369,11 @@ def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
         "0.2 0.22 0.25",
         "0.4 0.42 0.44",
     ]
-    if not os.access(ROOT / "mics", os.X_OK):
-        pytest.skip("./mics is not built")
     case = (
         "&run t_end = 1 /\n&grid cells = 6, 4, 40  length = 0.06, 0.04, 0.4 /\n"
         "&bed file = 'bed.txt' /\n"
     )
-    plan = subprocess.run(
-        [ROOT / "mics", "--check"], cwd=tmp_path, input=case, capture_output=True, text=True
-    )
-    assert plan.returncode == 0, plan.stderr
+    plan_of(tmp_path, case)
 
 
 def test_maps_need_no_other_program(tmp_path: Path) -> None:
@@ -393,5 +385,4 @@ def test_maps_need_no_other_program(tmp_path: Path) -> None:
         "except SystemExit as end: assert end.code == 0\n"
         "assert not {'pyvista', 'gmsh', 'trimesh', 'matplotlib'} & set(sys.modules)"
     )
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    python("-c", code, check=True)

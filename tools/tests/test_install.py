@@ -1,16 +1,14 @@
 """`make install` gives a program that runs from where it was put; the recipe of a container names
 what is there."""
 
-import os
 import re
 import shlex
 import subprocess
 import tomllib
 from pathlib import Path
 
-import pytest
+from calls import ROOT, needs_mics
 
-ROOT = Path(__file__).parents[2]
 RECIPE = (ROOT / "tools" / "Containerfile").read_text().replace("\\\n", " ")
 
 
@@ -18,9 +16,8 @@ def make(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["make", "-s", *words], cwd=ROOT, capture_output=True, text=True)
 
 
+@needs_mics
 def test_an_installed_program_runs(tmp_path: Path) -> None:
-    if not os.access(ROOT / "mics", os.X_OK):
-        pytest.skip("./mics is not built")
     done = make("install", "PREFIX=/opt/a b", f"DESTDIR={tmp_path}")
     assert done.returncode == 0, done.stderr
     there = tmp_path / "opt" / "a b"

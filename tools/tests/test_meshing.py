@@ -1,20 +1,17 @@
 """Surfaces to blocks: volumes kept, faults of drawings repaired with a warning or refused."""
 
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from calls import mics_tools
+from calls import ROOT, mics_tools, needs_mics, plan_of, python
 from micstools.shapes import meshing
 from micstools.shapes.shape import hexapod
 
 trimesh = pytest.importorskip("trimesh")
-ROOT = Path(__file__).parents[2]
 D = 20.0  # edge of the cubes [mm]
 
 
@@ -26,6 +23,19 @@ def hexapod_surface() -> "trimesh.Trimesh":
 
 def save(mesh: "trimesh.Trimesh", path: Path) -> Path:
     mesh.export(path)
+    return path
+
+
+def step_file(path: Path, *solids: tuple) -> Path:
+    """Solids of Open CASCADE by gmsh: their names and sizes [mm]."""
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    for kind, *sizes in solids:
+        getattr(gmsh.model.occ, f"add{kind}")(*sizes)
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(path))
+    gmsh.finalize()
     return path
 
 
@@ -48,14 +58,8 @@ def test_curved_block_keeps_its_volume(tmp_path: Path) -> None:
 
 
 def test_step_file_has_the_volume_of_its_form(tmp_path: Path) -> None:
-    gmsh = pytest.importorskip("gmsh")
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 60, 20)
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(tmp_path / "cylinder.step"))
-    gmsh.finalize()
-    surface = meshing.load(tmp_path / "cylinder.step", 4.0)
+    path = step_file(tmp_path / "cylinder.step", ("Cylinder", 0, 0, 0, 0, 0, 60, 20))
+    surface = meshing.load(path, 4.0)
     total = abs(meshing.tet_volumes(meshing.fill(surface)).sum())
     assert total == pytest.approx(np.pi * 20**2 * 60, rel=0.01)
     with pytest.raises(meshing.BadSurface, match="smaller --element"):
@@ -242,20 +246,15 @@ def test_a_part_inside_another_is_refused() -> None:
 
 
 def test_solids_of_a_step_file_are_united(tmp_path: Path) -> None:
-    gmsh = pytest.importorskip("gmsh")
-    for place in (10.0, 50.0):
-        gmsh.initialize(interruptible=False)
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.model.occ.addBox(0, 0, 0, 20, 20, 20)
-        gmsh.model.occ.addBox(place, 5, 3, 20, 20, 20)
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(tmp_path / f"{place:g}.step"))
-        gmsh.finalize()
-    surface = meshing.load(tmp_path / "10.step")
+    first = ("Box", 0, 0, 0, 20, 20, 20)
+    near, far = (
+        step_file(tmp_path / f"{x}.step", first, ("Box", x, 5, 3, 20, 20, 20)) for x in (10, 50)
+    )
+    surface = meshing.load(near)
     assert surface.warnings == ["2 parts were united: -15.94% of their volumes together"]
     assert surface.volume == pytest.approx(2 * 20**3 - 10 * 15 * 17, rel=1e-9)
     with pytest.raises(meshing.BadSurface, match="holds 2 solids apart"):
-        meshing.load(tmp_path / "50.step")
+        meshing.load(far)
 
 
 def test_a_fine_surface_is_simplified_on_request(tmp_path: Path) -> None:
@@ -313,30 +312,19 @@ def test_centimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
     assert small.warnings == []
 
 
+@needs_mics
 def test_script_writes_a_file_the_program_reads(tmp_path: Path) -> None:
     save(hexapod_surface(), tmp_path / "block.stl")
-    script = [sys.executable, ROOT / "tools" / "make_shape.py", "block.stl", "--size", "0.06"]
-    done = subprocess.run(
-        [*script, "--out", "block.txt", "--no-picture"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    words = ("block.stl", "--size", "0.06", "--out", "block.txt", "--no-picture")
+    done = python(ROOT / "tools" / "make_shape.py", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert re.search(r"volume +5\.6e-05 m3", done.stdout)
     assert "weight" in done.stdout and "inertia x" in done.stdout
-    if not (ROOT / "mics").exists():
-        pytest.skip("./mics is not built")
     case = (
         "&run t_end = 1 /\n&grid cells = 6, 4, 4  length = 0.3, 0.2, 0.2 /\n"
         "&shape name = 'b'  kind = 'file'  file = 'block.txt' /\n"
     )
-    plan = subprocess.run(
-        [ROOT / "mics", "--check"], cwd=tmp_path, input=case, capture_output=True, text=True
-    )
-    assert plan.returncode == 0, plan.stderr
-    assert "0.06 x 0.06 x 0.06 m, 30 facets" in plan.stdout
+    assert "0.06 x 0.06 x 0.06 m, 30 facets" in plan_of(tmp_path, case)
 
 
 def test_the_command_simplifies_and_unites(tmp_path: Path, capsys) -> None:
@@ -359,13 +347,8 @@ def test_the_command_simplifies_and_unites(tmp_path: Path, capsys) -> None:
 
 def test_script_refuses_a_bad_file(tmp_path: Path) -> None:
     (tmp_path / "bad.stl").write_text("solid nothing\nendsolid nothing\n")
-    done = subprocess.run(
-        [sys.executable, ROOT / "tools" / "make_shape.py", "bad.stl", "--out", "block.txt"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    words = ("bad.stl", "--out", "block.txt")
+    done = python(ROOT / "tools" / "make_shape.py", *words, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("make_shape: ")
     assert not (tmp_path / "block.txt").exists()
@@ -373,17 +356,11 @@ def test_script_refuses_a_bad_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "metres"), [(".MILLI.", 0.06), ("$", 60.0)])
 def test_a_step_file_tells_its_unit(unit: str, metres: float, tmp_path: Path) -> None:
-    gmsh = pytest.importorskip("gmsh")
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.occ.addBox(0, 0, 0, 60, 20, 20)
-    gmsh.model.occ.synchronize()
-    gmsh.write(str(tmp_path / "box.step"))
-    gmsh.finalize()
-    text = (tmp_path / "box.step").read_text()
+    path = step_file(tmp_path / "box.step", ("Box", 0, 0, 0, 60, 20, 20))
+    text = path.read_text()
     assert "SI_UNIT(.MILLI.,.METRE.)" in text
-    (tmp_path / "box.step").write_text(text.replace("(.MILLI.,.METRE.)", f"({unit},.METRE.)"))
-    surface = meshing.load(tmp_path / "box.step")
+    path.write_text(text.replace("(.MILLI.,.METRE.)", f"({unit},.METRE.)"))
+    surface = meshing.load(path)
     assert meshing.scale_of(surface, None, None) * surface.length == pytest.approx(metres)
     assert meshing.scale_of(surface, None, 0.001) * surface.length == pytest.approx(metres)
     assert surface.warnings == []

@@ -2,7 +2,6 @@
 
 import ast
 import email
-import os
 import subprocess
 import sys
 import tomllib
@@ -12,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from calls import ROOT, python
 from micstools import cli, extras
 from micstools.reading import schema
 from micstools.reading.reader import Run
 
-ROOT = Path(__file__).parents[2]
 IMPORTED_AS = {"dask_jobqueue": "dask-jobqueue", "imageio_ffmpeg": "imageio-ffmpeg",
                "PIL": "pillow", "vtkmodules": "vtk"}  # fmt: skip
 
@@ -36,9 +35,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (source / name).symlink_to((ROOT / name).readlink())
         elif (ROOT / name).is_file():
             (source / name).write_bytes((ROOT / name).read_bytes())
-    words = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index",
+    words = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index",
              "--no-build-isolation", "--wheel-dir", folder, source]  # fmt: skip
-    subprocess.run(words, check=True, capture_output=True, text=True)
+    python(*words, check=True)
     (found,) = folder.glob("*.whl")
     return found
 
@@ -66,10 +65,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def call(installed: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "micstools.cli", *words], cwd=installed, capture_output=True,
-        text=True, timeout=120, env={**os.environ, "PYTHONPATH": str(installed)},
-    )  # fmt: skip
+    return python("-m", "micstools.cli", *words, cwd=installed, tools=installed)
 
 
 def names_of(requirements: list[str], extra: str = "") -> set[str]:
@@ -137,9 +133,8 @@ def test_an_installed_package_reads_cases_and_runs(installed: Path, loose_pile: 
         "case, run = Case.read(sys.argv[1]), Run(sys.argv[2])\n"
         "print(case.run.about('dt'), len(case.body), len(run.blocks), dict(run.fields.sizes))"
     )
-    words = [sys.executable, "-c", program, ROOT / "input" / "blocks_coarse.nml", loose_pile.folder]
-    done = subprocess.run(words, cwd=installed, capture_output=True, text=True, timeout=120,
-                          env={**os.environ, "PYTHONPATH": str(installed)})  # fmt: skip
+    words = ("-c", program, ROOT / "input" / "blocks_coarse.nml", loose_pile.folder)
+    done = python(*words, cwd=installed, tools=installed)
     assert done.returncode == 0, done.stderr
     assert "[s]" in done.stdout and f" 3 {401 * 9} " in done.stdout and "'time': 17" in done.stdout
 

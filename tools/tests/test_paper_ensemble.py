@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calls import MICS, needs_mics
 from micstools.cases import program, settings
 from micstools.cli import script
 from micstools.commands import paper
@@ -33,13 +34,10 @@ def test_choices_differ_in_what_they_say() -> None:
     assert len(set(others)) == len(others)
 
 
+@needs_mics
 def test_the_program_takes_every_choice() -> None:
-    try:
-        path = program.find()
-    except BadRun:
-        pytest.skip("mics is not built")
     for choice in CHOICES:
-        program.check(path, choice.text(CASE))
+        program.check(MICS, choice.text(CASE))
 
 
 def test_fixed_blocks_move_along_the_tank_and_turn_about_the_upright() -> None:
@@ -69,14 +67,11 @@ def test_the_row_of_an_ensemble(tmp_path: Path) -> None:
     assert found["top [mm]"] == "46"  # of three, on the floor: that of the fixed cubes
 
 
+@needs_mics
 def test_runs_what_is_missing_and_writes_the_table(
     tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With the program itself, in air: three blocks, let go in a moment."""
-    try:
-        program.find()
-    except BadRun:
-        pytest.skip("mics is not built")
     case, out = tmp_path / "blocks.nml", tmp_path / "out"
     dry = ("run.physics='dry'", "run.t_end=0.6", "drop.count=2", "drop.interval=0.3")
     case.write_text(program.case_text(paper.CASE, list(dry)))

@@ -2,7 +2,6 @@
 that it works in a browser without a network."""
 
 import base64
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from browser import Browser
-from calls import mics_tools
+from calls import MICS, mics_tools, needs_mics
 from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import SetUp
 from micstools.reading import units
@@ -19,9 +18,7 @@ from micstools.reading.reader import Grid, Run
 from synthetic import write_run
 from test_page import scene_of
 
-ROOT = Path(__file__).parents[2]
-MICS = ROOT / "mics"
-pytestmark = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
+pytestmark = needs_mics
 CASE = """&run t_end = 8  dt = 0.02  title = '<i>Crane</i> and pusher' /
 &grid cells = 48, 24, 16  length = 24, 12, 8 /
 &fluid water_level = 9 /

@@ -32,6 +32,7 @@ from hypothesis import settings as settings_of_hypothesis  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from browser import Browser  # noqa: E402
+from calls import MICS, needs_mics, program  # noqa: E402
 from micstools.cases import settings  # noqa: E402
 from micstools.pages import set_up  # noqa: E402
 from micstools.reading.reader import BadRun, Run  # noqa: E402
@@ -41,9 +42,6 @@ from micstools.serve.server import ADDRESS, TOKEN, Site  # noqa: E402
 from synthetic import Motion, write_run  # noqa: E402
 from test_pile_ensemble import write_ensemble  # noqa: E402
 
-ROOT = Path(__file__).parents[2]
-MICS = ROOT / "mics"
-needs_mics = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
 CASE = """! a remark that stays
 &run t_end = 50  dt = 0.002  physics = 'dry'  output = 'mics-here'  title = 'Two cubes' /
 &grid cells = 4, 2, 3  length = 0.4, 0.2, 0.3 /
@@ -169,12 +167,12 @@ def test_a_key_lets_one_browser_in_once(run_site: Site) -> None:
 
 def test_the_browser_is_told_no_key(tmp_path: Path) -> None:
     """Its command line names a file that nobody else can read, and which goes after its use."""
-    script, told = tmp_path / "browser", tmp_path / "told"
-    script.write_text(
+    told = tmp_path / "told"
+    script = program(
+        tmp_path / "browser",
         f'#!/bin/sh\necho "$1" > {told}.new\nmv {told}.new {told}\n'
-        'while [ -e "${1#file://}" ]; do sleep 0.1; done\n'
+        'while [ -e "${1#file://}" ]; do sleep 0.1; done\n',
     )
-    script.chmod(0o755)
     words = [sys.executable, "-m", "micstools.cli", "watch", str(write_run(tmp_path / "run"))]
     environment = {**os.environ, "BROWSER": f"{script} %s &", "HOME": str(tmp_path)}
     with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE) as process:
@@ -388,12 +386,10 @@ def test_few_rows_are_read_of_a_long_run(tmp_path: Path) -> None:
 
 
 def test_a_check_that_does_not_end_is_refused(tmp_path: Path) -> None:
-    program = tmp_path / "mics"
-    program.write_text("#!/bin/sh\nexec sleep 60\n")
-    program.chmod(0o755)
+    slow = program(tmp_path / "mics", "#!/bin/sh\nexec sleep 60\n")
     with (
         pytest.raises(set_up.Refused, match=r"the check takes more than 0.2 s"),
-        set_up.read(program, CASE, 0.2),
+        set_up.read(slow, CASE, 0.2),
     ):
         pass
 

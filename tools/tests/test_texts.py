@@ -1,14 +1,12 @@
 """README, guide, gallery, architecture and all other texts: what they show works, what they name
 is there, stages, versions and constants are those of the sources, links of built pages are good."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path, PurePosixPath
 
 import pytest
 
+from calls import ROOT, needs_mics, python
 from check_links import broken_links
 from doc_pages import IN_SITE, Links, Page, pages, with_links
 from fences import fences
@@ -18,7 +16,6 @@ from micstools.commands.base import Parser
 from micstools.reading.reader import Run
 from packages import HEIGHT, TOP
 
-ROOT = Path(__file__).parents[2]
 TEXTS = ["README.md", "docs/guide.md", "docs/gallery.md"]
 GALLERY = ROOT / "docs" / "gallery.md"
 PAGES = ["README.md", "CONTRIBUTING.md", "CITATION.cff", "verification/README.md"]
@@ -119,22 +116,14 @@ def test_every_case_has_its_picture_and_its_commands() -> None:
         assert latest <= settings.value(run, "run", "t_end")
 
 
+@needs_mics
 def test_the_example_in_python_runs(loose_pile: Run, tmp_path: Path) -> None:
     (example,) = [
         text for language, text in fences(ROOT / "docs" / "guide.md") if language == "python"
     ]
-    if not os.access(ROOT / "mics", os.X_OK):
-        pytest.skip("./mics is not built")
     (tmp_path / "input").symlink_to(ROOT / "input")
     (tmp_path / "mics-coarse").symlink_to(loose_pile.folder)
-    done = subprocess.run(
-        [sys.executable, "-c", example],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "tools"), "OMP_NUM_THREADS": "1"},
-    )
+    done = python("-c", example, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "60 x 20 x 40 cells" in done.stdout and "time of the run" in done.stdout
     assert Run(tmp_path / "mics-7").bodies.time[-1] == pytest.approx(0.2)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from calls import ROOT, needs_mics, program
 from fences import fences
 
-ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 SAID = {
     "convergence": [
@@ -61,11 +61,9 @@ def install(folder: Path) -> None:
     """What a reader finds in the folder of mics: the program, its cases, Python and the tools."""
     (folder / "mics").symlink_to(ROOT / "mics")
     shutil.copytree(ROOT / "input", folder / "input")
-    (folder / ".venv" / "bin").mkdir(parents=True)
     for name, words in (("python", ""), ("mics-tools", "-m micstools.cli ")):
-        path = folder / ".venv" / "bin" / name
-        path.write_text(f'#!/bin/sh\nexec "{sys.executable}" {words}"$@"\n')
-        path.chmod(0o755)
+        text = f'#!/bin/sh\nexec "{sys.executable}" {words}"$@"\n'
+        program(folder / ".venv" / "bin" / name, text)
 
 
 def follow(page: Path, folder: Path) -> str:
@@ -92,11 +90,10 @@ def follow(page: Path, folder: Path) -> str:
     return said
 
 
+@needs_mics
 @pytest.mark.cost(15)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_tutorial_works(page: Path, tmp_path: Path) -> None:
-    if not os.access(ROOT / "mics", os.X_OK):
-        pytest.skip("./mics is not built")
     install(tmp_path)
     said = follow(page, tmp_path)
     for pattern in SAID[page.stem]:
@@ -108,12 +105,11 @@ def test_the_tutorial_works(page: Path, tmp_path: Path) -> None:
 NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
 
 
+@needs_mics
 @pytest.mark.cost(15)
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    if not os.access(ROOT / "mics", os.X_OK):
-        pytest.skip("./mics is not built")
     monkeypatch.setenv("PYTHONPATH", str(ROOT / "tools"))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     book = nbformat.read(path, as_version=4)
