@@ -82,30 +82,26 @@ def _of_ensemble(ensemble: Ensemble) -> int:
     if ensemble.example.run.note:
         print(f"     {ensemble.example.run.note}")
     for part in ensemble.parts:
-        _tell(part)
+        # Print what there is to say of the runs of one choice
+        total = len(part.piles)
+        head, chosen = f"{part.name}: " if part.name else "", part.units
+        if found := part.placing:
+            print(head + ascii_of(placing.words(found, chosen)))
+        if part.has_patterns:
+            shares = pile_ensemble.pattern_shares(part.piles)
+            said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
+            print(head + ", ".join(said))
+        print(f"numbers of the {len(part.whole)} complete piles of {total}: median (5 to 95 %)")
+        for name, spread in pile_ensemble.spreads(part).items():
+            unit = pile_numbers.unit(chosen, name)
+            low, high = (unit.figure(spread[k], 5) for k in ("5 %", "95 %"))
+            print(ascii_of(f"     {name:20}{unit.text(spread['median'], 5)} ({low} to {high})"))
     path = files.write_table(ensemble.folder / "pile.csv", pile_ensemble.rows(ensemble))
     if ensemble.whole:
         _write_maps(ensemble)
     print(path)
     write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
     return 0
-
-
-def _tell(part: Ensemble) -> None:
-    """Print what there is to say of the runs of one choice."""
-    total = len(part.piles)
-    head, chosen = f"{part.name}: " if part.name else "", part.units
-    if found := part.placing:
-        print(head + ascii_of(placing.words(found, chosen)))
-    if part.has_patterns:
-        shares = pile_ensemble.pattern_shares(part.piles)
-        said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
-        print(head + ", ".join(said))
-    print(f"numbers of the {len(part.whole)} complete piles of {total}: median (5 to 95 %)")
-    for name, spread in pile_ensemble.spreads(part).items():
-        unit = pile_numbers.unit(chosen, name)
-        low, high = (unit.figure(spread[k], 5) for k in ("5 %", "95 %"))
-        print(ascii_of(f"     {name:20}{unit.text(spread['median'], 5)} ({low} to {high})"))
 
 
 def _write_maps(ensemble: Ensemble) -> None:

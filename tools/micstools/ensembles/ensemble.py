@@ -133,7 +133,7 @@ def state(member: Member) -> State:
     except BadRun as error:
         return State("failed", None, reason=last or str(error))
     if code == 0:
-        end = settings_end(member.text)
+        end = float(settings.value(member.text, "run", "t_end"))
         return State("time over" if time >= end - 1e-9 else "settled", code, time)
     if code == 3 and NO_ROOM in said:
         return State("no room", code, time)
@@ -146,8 +146,3 @@ def _end(h5: h5py.File) -> tuple[int, float]:
     """Exit status and last time [s]."""
     status = np.ravel(h5["provenance"].attrs["exit_status"])[0]
     return int(status), float(h5["series/time"][-1])
-
-
-def settings_end(text: str) -> float:
-    """`t_end` of a case [s]."""
-    return float(settings.value(text, "run", "t_end"))

@@ -291,7 +291,11 @@ def _wall(ensemble: Ensemble) -> Markup:
     """A small picture of every pile, by pattern; a click shows it in three dimensions."""
     marks = {k: words for part in ensemble.parts
              for k, words in pile_ensemble.remarkable(part).items()}  # fmt: skip
-    frame = _frame(ensemble)
+    # The box around the piles of all runs, with a margin, within the tank
+    boxes = np.array([p.numbers.box for p in ensemble.piles])
+    low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
+    grid, margin = ensemble.example.run.grid, 0.08 * float((high - low).max())
+    frame = np.maximum(low - margin, grid.low), np.minimum(high + margin, grid.high)
     parts: list[Markup] = []
     for name, piles in _groups(ensemble):
         entries = [_thumbnail(p, marks.get(p.number, []), ensemble.units, frame) for p in piles]
@@ -319,14 +323,6 @@ def _groups(ensemble: Ensemble) -> list[tuple[str, list[Pile]]]:
         partly = [p for p in ensemble.piles if not p.complete]
         found = [("All blocks let go", ensemble.whole), ("Blocks without room", partly)]
     return [(name, piles) for name, piles in found if piles]
-
-
-def _frame(ensemble: Ensemble) -> tuple[Array, Array]:
-    """The box around the piles of all runs, with a margin, within the tank."""
-    boxes = np.array([p.numbers.box for p in ensemble.piles])
-    low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
-    grid, margin = ensemble.example.run.grid, 0.08 * float((high - low).max())
-    return np.maximum(low - margin, grid.low), np.minimum(high + margin, grid.high)
 
 
 def _thumbnail(p: Pile, marks: list[str], units: Units, frame: tuple[Array, Array]) -> Markup:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micstools.reading.overlap import WALL_KINDS
 from micstools.reading.reader import Run
@@ -83,7 +82,11 @@ def _made(run: Run, gains: Array) -> Array:
     s = run.series
     made, n = gains.sum(axis=1), min(len(gains), s.time.size)  # of a run that goes on
     made[1:n] += np.diff(np.nan_to_num(s.contact_energy[:n]))
-    return np.where(_single_steps(run), made, np.nan)
+    time = run.bodies.time
+    single = np.ones(time.size, dtype=bool)  # rows that end one step after the row before
+    dt = s.dt[1 : time.size]
+    single[1 : dt.size + 1] = np.abs(np.diff(time)[: dt.size] - dt) <= _SAME * dt
+    return np.where(single, made, np.nan)
 
 
 def _gains(run: Run) -> Array:
@@ -104,13 +107,4 @@ def _gains(run: Run) -> Array:
         found[1:, k] = np.minimum(
             (force * speed + torque * spin).sum(axis=1), (force * way + torque * turn).sum(axis=1)
         )
-    return found
-
-
-def _single_steps(run: Run) -> NDArray[np.bool_]:
-    """Which rows (T) end one step after the row before; the first one does."""
-    time = run.bodies.time
-    found = np.ones(time.size, dtype=bool)
-    dt = run.series.dt[1 : time.size]
-    found[1 : dt.size + 1] = np.abs(np.diff(time)[: dt.size] - dt) <= _SAME * dt
     return found

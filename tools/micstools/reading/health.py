@@ -55,7 +55,10 @@ class Check:
 
 def checks(run: Run, units: Units) -> list[Check]:
     """All that are known of a run."""
-    found = [_end(run)]
+    code = int(run.provenance.get("exit_status", -1))
+    words, advice = _ENDINGS.get(code, ("unknown", "see the last messages of the program"))
+    when = f"{words} (code {code}), t = {figure(float(run.series.time[-1]))} s"
+    found = [Check("end of the run", when, "regular", code == 0, advice, float(code != 0))]
     if run.bodies.n:
         found += [*_rest(run, units), *_overlaps(run, units), _made(run, units)]
     if np.isfinite(run.series.liquid_volume_drift).any():
@@ -82,13 +85,6 @@ def deepest(found: Overlap) -> str:
     pairs = {f"blocks {i + 1} and {j + 1}": d for (i, j), d in found.blocks.items()}
     pairs |= {f"block {k + 1} in the wall {side}": d for (k, side), d in found.walls.items()}
     return max(pairs, key=lambda key: pairs[key], default="")
-
-
-def _end(run: Run) -> Check:
-    code = int(run.provenance.get("exit_status", -1))
-    words, advice = _ENDINGS.get(code, ("unknown", "see the last messages of the program"))
-    when = f"{words} (code {code}), t = {figure(float(run.series.time[-1]))} s"
-    return Check("end of the run", when, "regular", code == 0, advice, float(code != 0))
 
 
 def _rest(run: Run, units: Units) -> list[Check]:

@@ -111,7 +111,10 @@ def _of_block(run: Run, k: int, length: float, clear: float) -> tuple[Array, Arr
     whole &= _none(b.contacts[:, k] > 0, past, late)
     whole &= _none(b.position[:, k, 2] >= level - _DEPTH * length, row, end)
     far = np.zeros(row.size, dtype=bool)
-    far[1:] = np.diff(time) > (1 + _SAME) * np.maximum(_rows_apart(run, length), _steps(run)[1:])
+    steps = np.zeros(time.size)  # that ended at each row of the bodies (T) [s]
+    dt = run.series.dt[: steps.size]
+    steps[: dt.size] = np.nan_to_num(dt)
+    far[1:] = np.diff(time) > (1 + _SAME) * np.maximum(_rows_apart(run, length), steps[1:])
     later = [np.interp(time + span, time, b.velocity[:, k, d]) for d in range(3)]
     change = np.linalg.norm(np.stack(later, axis=1) - b.velocity[:, k], axis=1)
     values = np.where(whole, change / (span * np.linalg.norm(run.gravity)), np.nan)
@@ -128,14 +131,6 @@ def _rows_apart(run: Run, length: float) -> float:
     """Largest distance of rows that are not those of every step [s]: they must see the window, and
     every impact."""
     return min(window(run, length) / 2, float(run.value("contact", "contact_time")))
-
-
-def _steps(run: Run) -> Array:
-    """Length of the step that ended at each row of the bodies (T) [s]."""
-    found = np.zeros(run.bodies.time.size)
-    dt = run.series.dt[: found.size]
-    found[: dt.size] = np.nan_to_num(dt)
-    return found
 
 
 def _has_level(run: Run) -> bool:

@@ -93,15 +93,11 @@ class Site:
         """Answer to what changes something."""
         self.routes.append(("POST", path, handler))
 
-    def app(self) -> web.Application:
-        """The application, with its guard."""
-        found = web.Application(middlewares=[self._guard], client_max_size=_LARGEST)
-        found.add_routes([web.route(method, path, work) for method, path, work in self.routes])
-        return found
-
     def runner(self) -> web.AppRunner:
         """What serves it; a connection without a whole request is closed after a while."""
-        return web.AppRunner(self.app(), access_log=None, keepalive_timeout=_PATIENCE)
+        found = web.Application(middlewares=[self._guard], client_max_size=_LARGEST)
+        found.add_routes([web.route(method, path, work) for method, path, work in self.routes])
+        return web.AppRunner(found, access_log=None, keepalive_timeout=_PATIENCE)
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:

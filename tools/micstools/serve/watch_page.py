@@ -157,12 +157,14 @@ def ensemble_parts(
     left = [s.left for s in running.values() if np.isfinite(s.left)]
     if left:
         said += f" The next ends in {clock(min(left))}."
+    # How many runs have no outcome, and why
+    counted = Counter(end.outcome for end in states.values() if not end.counts)
     return {
         "state": markup(said),
         "bar": bar(done / total if total else 0.0, said),
         "shares": markup(
             table(["outcome", "share of the runs done (95 % interval)"], rows, numbers=False),
-            tag("p", _others(states), class_="note"),
+            tag("p", ", ".join(f"{n} {outcome}" for outcome, n in counted.items()), class_="note"),
         ),
         "runs": table(
             ["run", "", "seed", "outcome", "t [s]", ""],
@@ -170,12 +172,6 @@ def ensemble_parts(
             numbers=False,
         ),
     }
-
-
-def _others(states: dict[Member, ensemble.State]) -> str:
-    """How many runs have no outcome, and why."""
-    counted = Counter(end.outcome for end in states.values() if not end.counts)
-    return ", ".join(f"{n} {outcome}" for outcome, n in counted.items())
 
 
 def _run_row(member: Member, end: ensemble.State, found: State | None, title: str) -> list[object]:

@@ -47,23 +47,19 @@ def excess_of(run: Run, name: str, checks: Checks) -> None:
     checks.below(f"{name}: liquid of the frames / of the rows - 1", np.abs(off).max(), FRAME_BAND)
 
 
-def rise_of(run: Run, name: str, checks: Checks) -> None:
-    """Height of the water with the blocks under it at the end, over that of the start."""
-    length = run.grid.high - run.grid.low
-    frame = run.fields_at(run.field_times[-1])
-    solid = frame.solid.astype(float)
-    height = (solid + (1.0 - solid) * frame.liquid).mean() * length[2]
-    wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / length[:2].prod()
-    rise = height - run.value("fluid", "water_level")
-    checks.close(f"{name}: rise of the level [m]", rise, wanted, LEVEL_BAND)
-
-
 def check(runs: list[Run], checks: Checks) -> None:
     """Every run keeps its room; where all blocks are dropped the level tells their volume."""
     for run in runs:
         name = run.folder.name
         excess_of(run, name, checks)
         if name.startswith(("case", "flat")):
-            rise_of(run, name, checks)
+            # Height of the water with the blocks under it at the end, over that of the start
+            length = run.grid.high - run.grid.low
+            frame = run.fields_at(run.field_times[-1])
+            solid = frame.solid.astype(float)
+            height = (solid + (1.0 - solid) * frame.liquid).mean() * length[2]
+            wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / length[:2].prod()
+            rise = height - run.value("fluid", "water_level")
+            checks.close(f"{name}: rise of the level [m]", rise, wanted, LEVEL_BAND)
         curves = {name: (run.series.time, run.series.volume_excess_max)}
         checks.figure("largest excess of fluid in a cell", "t [s]", "V", curves)
