@@ -49,40 +49,24 @@ def _borders(triangles: IntArray) -> list[list[int]]:
 
 
 def _closed(points: Array, loop: list[int], flat: float) -> IntArray:
-    """Triangles (n - 2, 3) between the n points around a plane hole, ear by ear."""
+    """Triangles (n - 2, 3) between the n points around a plane hole."""
+    import manifold3d
+
     corner = points[loop] - points[loop].mean(axis=0)
     axes = np.linalg.svd(corner)[2]
     if np.abs(corner @ axes[2]).max() > flat:
         raise NotPlane(f"the hole between {len(loop)} edges is not plane")
-    flat_corner = corner @ axes[:2].T
-    if _area(*flat_corner.T) < 0:
-        flat_corner[:, 1] *= -1
-    left, found = list(range(len(loop))), []
-    while len(left) > 3:
-        ear = next((k for k in range(len(left)) if _is_ear(flat_corner, left, k)), None)
-        if ear is None:
-            raise NotPlane(f"the border of the hole between {len(loop)} edges crosses itself")
-        found.append([left[ear - 1], left[ear], left[(ear + 1) % len(left)]])
-        del left[ear]
-    return np.asarray(np.array(loop)[np.array([*found, left])])
+    plan = corner @ axes[:2].T
+    if _area(plan) < 0:
+        plan[:, 1] *= -1
+    found = np.asarray(manifold3d.triangulate([plan]), np.int64)
+    area = np.array([_area(plan[triangle]) for triangle in found])
+    if len(found) != len(loop) - 2 or area.min() <= 0:
+        raise NotPlane(f"the border of the hole between {len(loop)} edges crosses itself")
+    return np.array(loop)[found]
 
 
-def _area(x: Array, y: Array) -> float:
-    """Twice the area of a polygon, positive counter-clockwise."""
+def _area(corner: Array) -> float:
+    """Twice the area of a polygon (n, 2), positive counter-clockwise."""
+    x, y = corner.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def _is_ear(corner: Array, left: list[int], k: int) -> bool:
-    """Can the corner number k of the polygon `left` be cut off?"""
-    ends = [left[k - 1], left[k], left[(k + 1) % len(left)]]
-    ear = corner[ends]
-    area = _area(*ear.T)
-    if area <= 1e-12 * float(np.ptp(corner, axis=0).max()) ** 2:
-        return False
-    others = corner[[m for m in left if m not in ends]]
-    sides = [
-        (ear[n - 2, 0] - ear[n, 0]) * (others[:, 1] - ear[n, 1])
-        - (ear[n - 2, 1] - ear[n, 1]) * (others[:, 0] - ear[n, 0])
-        for n in range(3)
-    ]
-    return not bool((np.min(sides, axis=0) >= -1e-12 * area).any())
