@@ -156,6 +156,24 @@ class Browser:
             raise RuntimeError(f"{script}: {found['exceptionDetails']}")
         return found["result"].get("value")
 
+    def corner(self) -> list[float]:
+        """Upper left of the player in the window [pixels]."""
+        script = "(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())"
+        found: list[float] = self.run(script)
+        return found
+
+    def choose(self, name: str, value: object, event: str = "change") -> None:
+        """Give a control, by its class, another value; until what follows is drawn."""
+        self.run(f"(s => {{ s.value = '{value}'; s.dispatchEvent(new Event('{event}')); }})"
+                 f"(document.querySelector('.{name}'))")  # fmt: skip
+        self.settle()
+
+    def out_of(self, boxes: str) -> list[str]:
+        """Texts that leave the boxes of a selector."""
+        script = Path(__file__).with_name("out_of_boxes.js").read_text()
+        found: list[str] = self.run(script.replace("BOXES", boxes))
+        return found
+
     def key(self, key: str) -> None:
         """Press a key."""
         text = {"text": key} if len(key) == 1 else {}

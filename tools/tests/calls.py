@@ -3,8 +3,10 @@
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,6 +38,15 @@ def plan_of(folder: Path, case: str) -> str:
     done = subprocess.run([MICS, "--check"], cwd=folder, input=case, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def until(work: Callable[[], Any], patience: float = 120.0) -> Any:
+    """The first answer that is true."""
+    end = time.monotonic() + patience
+    while not (found := work()):
+        assert time.monotonic() < end, "it does not come"
+        time.sleep(0.05)
+    return found
 
 
 def program(path: Path, text: str) -> Path:

@@ -12,14 +12,14 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import h5py
 import pytest
 
-from calls import MICS, mics_tools, needs_mics
+from calls import MICS, mics_tools, needs_mics, until
 from calls import program as stand_in
 from micstools.cases import settings
 from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
@@ -258,19 +258,12 @@ def ensemble_words(folder: Path, jobs: int) -> list[str]:
             "--runs", "3", "--jobs", str(jobs), "--out", str(folder)]  # fmt: skip
 
 
-def wait_until(happened: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not happened():
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
 def interrupted(folder: Path, restarts: int) -> str:
     """Start an ensemble, press Ctrl-C once some restart files are there; what it said."""
     running = subprocess.Popen(ensemble_words(folder, 2), stderr=subprocess.PIPE, text=True,
                                preexec_fn=ctrl_c_counts)  # fmt: skip
     try:
-        wait_until(lambda: len(list(folder.glob("*/result/restart-*.h5"))) >= restarts)
+        until(lambda: len(list(folder.glob("*/result/restart-*.h5"))) >= restarts)
         running.send_signal(signal.SIGINT)
         _, said = running.communicate(timeout=60)
     finally:
@@ -357,7 +350,7 @@ def slow_runs(program: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
             *words]  # fmt: skip
     running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
     try:
-        wait_until((folder / "out" / "0001" / "log.txt").exists)
+        until((folder / "out" / "0001" / "log.txt").exists)
         time.sleep(0.5)
         yield running
         if running.poll() is None:

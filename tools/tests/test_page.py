@@ -5,7 +5,6 @@ import base64
 import json
 import re
 import subprocess
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +15,7 @@ import numpy as np
 import pytest
 
 from browser import Browser
-from calls import mics_tools
+from calls import mics_tools, until
 from micstools.pages import charts, html, motion, run_page, run_words, views
 from micstools.pages.charts import Curve
 from micstools.piles import maps, pile_numbers
@@ -333,32 +332,11 @@ def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
     )
 
 
-def wait_for(browser: Browser, condition: str) -> None:
-    """Until an expression is true."""
-    for _ in range(100):
-        if browser.run(f"Boolean({condition})"):
-            return
-        time.sleep(0.05)
-    raise AssertionError(condition)
-
-
-OUT_OF_TILES = """[...document.querySelectorAll('.facts div')].filter(tile => {
-  const edge = tile.getBoundingClientRect();
-  return [...tile.querySelectorAll('*')].some(text => {
-    const range = document.createRange();
-    range.selectNodeContents(text);
-    const box = range.getBoundingClientRect();
-    return box.right > edge.right + 0.5 || box.bottom > edge.bottom + 0.5;
-  });
-}).map(tile => tile.textContent)"""
-"""Tiles whose text is wider or higher than they are."""
-
-
 @pytest.mark.parametrize("width", [360, 700, 1100])
 def test_no_text_leaves_its_tile(browser: Browser, report: Path, width: int) -> None:
     browser.open(report, width)
     assert browser.run("document.querySelectorAll('.facts div').length") == 8
-    assert browser.run(OUT_OF_TILES) == []
+    assert browser.out_of(".facts div") == []
 
 
 def test_the_page_plays(browser: Browser, report: Path) -> None:
@@ -368,7 +346,7 @@ def test_the_page_plays(browser: Browser, report: Path) -> None:
     assert browser.run("document.querySelectorAll('h1 *').length") == 0
     start = browser.run("runPlayer.stage.time")
     browser.run("document.querySelector('.play').click()")
-    wait_for(browser, f"runPlayer.stage.time > {start} + 0.1")
+    until(lambda: browser.run(f"runPlayer.stage.time > {start} + 0.1"))
     browser.run("document.querySelector('.play').click()")
     at = browser.run("runPlayer.stage.time")
     browser.settle()
@@ -381,11 +359,7 @@ def test_the_slider_moves_the_blocks(browser: Browser, report: Path, loose_pile:
     browser.open(report)
     seen = []
     for moment in (0.5, 7.0):
-        browser.run(
-            f"(s => {{ s.value = {moment}; s.dispatchEvent(new Event('input')); }})"
-            "(document.querySelector('.slider'))"
-        )
-        browser.settle()
+        browser.choose("slider", moment, "input")
         place = browser.run("runPlayer.stage.pose(3).place")
         row = loose_pile.bodies.row(moment)
         assert place == pytest.approx(loose_pile.bodies.position[row, 3].tolist(), abs=1e-3)
@@ -407,17 +381,13 @@ def test_keys_and_mouse_turn_and_zoom(browser: Browser, report: Path) -> None:
     assert browser.run("runPlayer.stage.yaw") != yaw
     assert browser.run("runPlayer.stage.distance") < 0.95 * far
     yaw = browser.run("runPlayer.stage.yaw")
-    x, y = browser.run("(r => [r.x + r.width / 2, r.y + 100])"
-                       "(document.querySelector('.stage').getBoundingClientRect())")  # fmt: skip
-    browser.drag((x, y), (x + 80, y))
+    x, y = browser.corner()
+    browser.drag((x + 100, y + 100), (x + 180, y + 100))
     assert browser.run("runPlayer.stage.yaw") == pytest.approx(yaw - 0.5)
-    browser.run("(s => { s.value = 5; s.dispatchEvent(new Event('change')); })"
-                "(document.querySelector('.follow'))")  # fmt: skip
+    browser.choose("follow", 5)
     assert browser.run("runPlayer.stage.followed") == 5
     for colouring in ("speed", "contacts", "block"):
-        browser.run(f"(s => {{ s.value = '{colouring}'; s.dispatchEvent(new Event('change')); }})"
-                    "(document.querySelector('.colouring'))")  # fmt: skip
-        browser.settle()
+        browser.choose("colouring", colouring)
     browser.run("document.querySelector('.stage').focus()")
     browser.key(" ")
     assert browser.run("runPlayer.playing") is True
@@ -427,7 +397,7 @@ def test_keys_and_mouse_turn_and_zoom(browser: Browser, report: Path) -> None:
 def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
     browser.open(report, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
-    assert browser.run(OUT_OF_TILES) == []
+    assert browser.out_of(".facts div") == []
     light = browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert light is not dark
 

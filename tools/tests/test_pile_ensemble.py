@@ -20,7 +20,6 @@ from micstools.reading import shares
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion, write_run
-from test_page import OUT_OF_TILES
 
 EDGE, HALF, HEXAPOD = 0.02, 0.01, 0.03
 LEFT, RIGHT, HIGH, WAITING = 0.04, 0.26, 0.12, (0.15, 0.05, 0.16)
@@ -387,4 +386,4 @@ def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
 def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
     browser.open(report, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
-    assert browser.run(OUT_OF_TILES.replace(".facts div", ".wall button")) == []
+    assert browser.out_of(".wall button") == []

@@ -147,11 +147,8 @@ def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     """It turns, marks a warning, lets blocks come; it loads nothing, and nothing fails."""
     browser.open(page)
     yaw = browser.run("planPlayer.stage.yaw")
-    x, y = browser.run(
-        "(r => [r.x + r.width / 2, r.y + r.height / 2])"
-        "(document.querySelector('.stage').getBoundingClientRect())"
-    )
-    browser.drag((x, y), (x + 80, y))
+    x, y = browser.corner()
+    browser.drag((x + 200, y + 150), (x + 280, y + 150))
     assert browser.run("planPlayer.stage.yaw") == pytest.approx(yaw - 0.5)
     numbers = browser.run("planPlayer.plan.marks.map(m => m.number)")
     assert set(numbers) == {mark["number"] for mark in scene_of(page)["plan"]["marks"]}

@@ -119,14 +119,6 @@ def view(browser: Browser, name: str) -> None:
     browser.settle()
 
 
-def choose(browser: Browser, name: str, value: object) -> None:
-    browser.run(
-        f"(s => {{ s.value = '{value}'; s.dispatchEvent(new Event('change')); }})"
-        f"(document.querySelector('.{name}'))"
-    )
-    browser.settle()
-
-
 def at(browser: Browser, point: list[float]) -> tuple[float, float]:
     """Where a point is seen, in pixels of the picture from its upper left."""
     found = browser.run(
@@ -137,9 +129,7 @@ def at(browser: Browser, point: list[float]) -> tuple[float, float]:
 
 def pixels(browser: Browser, *places: tuple[float, float]) -> np.ndarray:
     """The colours (n, 3) of the window at places of the picture."""
-    left, top = browser.run(
-        "(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())"
-    )
+    left, top = browser.corner()
     with Image.open(io.BytesIO(browser.picture())) as picture:
         window = np.asarray(picture.convert("RGB")).astype(int)
     return np.array([window[round(top + y), round(left + x)] for x, y in places])
@@ -161,7 +151,7 @@ def test_flat_views_are_to_scale(browser: Browser, page: Path) -> None:
 def test_a_length_is_measured(browser: Browser, page: Path) -> None:
     browser.open(page)
     view(browser, "top")
-    box = browser.run("(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())")
+    box = browser.corner()
     p, q = (
         [place + edge for place, edge in zip(at(browser, point), box, strict=True)]
         for point in ([0.05, 0.02, 0.0], [0.20, 0.08, 0.0])
@@ -184,7 +174,7 @@ def test_places_are_those_of_a_survey(browser: Browser, tmp_path: Path) -> None:
     folder = write_run(tmp_path / "far", Motion(t_end=0.1, scale=100 / 3, origin=tuple(corner)))
     browser.open(save(Run(folder), tmp_path / "far.html"))
     view(browser, "top")
-    box = browser.run("(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())")
+    box = browser.corner()
     seen = [p + edge for p, edge in zip(at(browser, [5.0, 2.0, 0.0]), box, strict=True)]
     browser.mouse("mouseMoved", *seen)
     browser.settle()
@@ -220,7 +210,7 @@ def lying(folder: Path, *place: float) -> Path:
 def bare(browser: Browser) -> None:
     """The end of a run without water and numbers."""
     browser.run("runPlayer.show(2)")
-    choose(browser, "wet", "none")
+    browser.choose("wet", "none")
     browser.run("document.querySelector('.numbers').click()")
 
 
@@ -267,7 +257,7 @@ def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) 
     folder = write_run(tmp_path / "run", Motion(t_end=0.1))
     flat = with_bed(folder, lambda x, y: 0 * x)
     browser.open(save(flat, tmp_path / "page.html"))
-    choose(browser, "wet", "none")
+    browser.choose("wet", "none")
     for yaw in (-0.5, -0.493, -0.31, 0.2, 0.7):
         browser.run(f"runPlayer.stage.yaw = {yaw}; runPlayer.stage.pitch = 0.4")
         browser.run("runPlayer.stage.scene.bodies.forEach(body => { body.release = null; })")
@@ -322,14 +312,14 @@ INK = """(() => {
 def test_a_path_is_drawn(browser: Browser, page: Path) -> None:
     browser.open(page)
     browser.run("runPlayer.show(6)")
-    choose(browser, "follow", 5)
+    browser.choose("follow", 5)
     browser.run("document.querySelector('.numbers').click()")
     browser.settle()
     bare = browser.run(INK)
     browser.run("document.querySelector('.paths').click()")
     browser.settle()
     one = browser.run(INK)
-    choose(browser, "follow", "")
+    browser.choose("follow", "")
     assert one > bare + 50 and browser.run(INK) > bare + 50
 
 
@@ -349,7 +339,7 @@ def test_the_water_is_coloured_by_its_speed(browser: Browser, page: Path) -> Non
     browser.run("runPlayer.show(2.1)")
     seen = {}
     for water in ("none", "clear", "speed"):
-        choose(browser, "wet", water)
+        browser.choose("wet", water)
         for name in FLAT:
             view(browser, name)
             seen[water, name] = pixels(browser, at(browser, [0.05, 0.05, 0.14]))[0]

@@ -14,7 +14,7 @@ import time
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -32,7 +32,7 @@ from hypothesis import settings as settings_of_hypothesis  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from browser import Browser  # noqa: E402
-from calls import MICS, needs_mics, program  # noqa: E402
+from calls import MICS, needs_mics, program, until  # noqa: E402
 from micstools.cases import settings  # noqa: E402
 from micstools.pages import set_up  # noqa: E402
 from micstools.reading.reader import BadRun, Run  # noqa: E402
@@ -86,15 +86,6 @@ def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
     answer = link.getresponse()
     found = answer.status, dict(answer.getheaders()), answer.read().decode()
     link.close()
-    return found
-
-
-def until(work: Callable[[], Any], patience: float = 120.0) -> Any:
-    """The first answer that is true."""
-    end = time.monotonic() + patience
-    while not (found := work()):
-        assert time.monotonic() < end, "it does not come"
-        time.sleep(0.05)
     return found
 
 
@@ -196,18 +187,7 @@ def test_the_browser_is_told_no_key(tmp_path: Path) -> None:
             process.kill()
 
 
-# Does with the session of the page what its buttons do.
-ATTACK = """<!doctype html><title>foreign</title><script>
-(async () => {
-  try {
-    const page = await (await fetch('/')).text();
-    const token = page.match(/mics-token" content="([^"]+)/)[1];
-    await fetch('/report', { method: 'POST', body: '{}', headers: { 'X-Mics-Token': token } });
-    document.title = 'let in';
-  } catch (problem) { document.title = 'refused'; }
-})();
-</script>
-"""
+ATTACK = Path(__file__).with_name("attack.html").read_text()
 
 
 def test_a_foreign_report_reaches_nothing(run_site: Site, browser: Browser) -> None:
@@ -663,10 +643,8 @@ def test_a_case_is_edited_run_stopped_and_reported(
 
         browser.run("document.querySelector('[data-view=front]').click()")
         browser.run("document.querySelector('.stage').scrollIntoView({ block: 'center' })")
-        browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        left, top = browser.run(
-            "(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())"
-        )
+        browser.settle()
+        left, top = browser.corner()
         x, y = browser.run(
             "(p => [p.x, p.y])(studio.player.stage.overlay.at(studio.player.stage.pose(1).place))"
         )

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,47 +15,7 @@ from calls import ROOT, needs_mics, program
 from fences import fences
 
 PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
-SAID = {
-    "convergence": [
-        r"impact_speed +0\.38\d+, 0\.36\d+, 0\.35\d* m/s  \(no order fits\)",
-        r"impact_speed +0\.36\d+, 0\.36\d+, 0\.36\d* m/s  \(not monotone\)",
-        r"impact at 0\.36 to 0\.37 m/s: not monotone\n",
-    ],
-    "crane": [
-        r"27 free units, 11 of them at rest",
-        r"layer coefficient of 1 layer \d\.\d+ by the ball",
-        r"down the slope: \d\.\d+ m on average",
-    ],
-    "hopper": [
-        r"current 0\.6 m/s: middle of the load at x = \d+\.\d m",
-        r"current 1\.2 m/s: middle of the load at x = \d+\.\d m",
-    ],
-    "own_block": [
-        r"3 parts were united: -22\.22%",
-        r"cross is 3 cells long",
-        r"numbers of the \d complete piles of 6",
-        r"covered in half of the piles or more: \d+\.\d cm2",
-    ],
-    "reef_in_current": [
-        r"x +-0\.005 to 0\.605 m",
-        r"blocks  3, fixed: none",
-        r"block 3: let go at x = 0\.\d+ m, lies at x = 0\.\d+ m",
-        r"x = 0\.5 m: 0\.",
-    ],
-    "reef_list": [
-        r"dropped +35, the last one at 136 s",
-        r"\d+ of 12 \(\d+ %, \d+ to \d+\) of the free units lie within 0\.3 m",
-        r"A3 354207\.\d+ 562108[12]\.\d+ 0\.\d+ 0\.\d+",
-    ],
-}
-MADE = {
-    "crane": ["input/check.html", "mics-lines/places.geojson"],
-    "hopper": ["mics-slow/run.h5", "mics-fast/run.h5"],
-    "reef_list": ["mics-reefs/places.geojson"],
-    "convergence": ["mics-fall/3/result/run.h5"],
-    "own_block": ["cross.txt", "mics-crosses/report.html"],
-    "reef_in_current": ["slope.txt", "mics-reef/run.h5", "reef.vtm"],
-}
+EXPECTED = tomllib.loads(Path(__file__).with_name("tutorials.toml").read_text())
 
 
 def install(folder: Path) -> None:
@@ -96,9 +57,9 @@ def follow(page: Path, folder: Path) -> str:
 def test_the_tutorial_works(page: Path, tmp_path: Path) -> None:
     install(tmp_path)
     said = follow(page, tmp_path)
-    for pattern in SAID[page.stem]:
+    for pattern in EXPECTED[page.stem]["said"]:
         assert re.search(pattern, said), f"{pattern}\n{said}"
-    assert [name for name in MADE[page.stem] if not (tmp_path / name).is_file()] == []
+    assert [name for name in EXPECTED[page.stem]["made"] if not (tmp_path / name).is_file()] == []
     assert f"](docs/tutorials/{page.name})" in (ROOT / "README.md").read_text()
 
 

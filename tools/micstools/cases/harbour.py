@@ -3,6 +3,7 @@ one by one on a slope in a given water, to run."""
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 from micstools.reading.reader import BadRun
 
@@ -10,42 +11,8 @@ PITCH = 1.5  # distance of the places where blocks are dropped, in heights of a 
 CLEAR = 0.8  # of the drop above the water and below the top, likewise
 LAYERS = 5  # blocks dropped at one place, as a rule
 FALL = 4.0  # s, from one drop at a place to the next
-CASE = """\
-! {blocks} of {height:g} m in {waves} layers, dropped across a basin of {x:g} x {y:g} x {z:g} m
-&run
-  title = 'harbour'
-  t_end = {t_end:g}
-  dt = 0.02
-  output = 'harbour-out'
-  field_interval = 1.0
-  history_interval = 0.1
-  restart_interval = 5.0
-/
-&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = {x:g}, {y:g}, {z:g} /
-&boundary x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip'  z_max = 'open' /
-&fluid water_level = {water:g} /
-&contact contact_time = 0.02 /
-&shape name = 'unit'  kind = '{kind}'  size = {height:g}  density = 2400.0 /
-"""
-LIGHT = """\
-! {blocks} of {height:g} m, one every {every:g} s, on a slope of 1:{slope:g}, {water:g} m of water
-&run
-  title = 'harbour, one by one'
-  physics = 'light'
-  t_end = {t_end:g}
-  dt = 0.05
-  output = 'harbour-out'
-  field_interval = {frames:g}
-  history_interval = {rows:g}
-  restart_interval = {restarts:g}
-/
-&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = {x:g}, {y:g}, {z:g} /
-&boundary z_max = 'open' /
-&fluid water_level = {water:g}  liquid_density = 1025.0 /
-&bed file = '{bed}' /
-&contact contact_time = {contact:.3g}  wall_friction = 0.6 /
-&shape name = 'unit'  kind = '{kind}'  size = {height:g}  density = 2400.0 /
-"""
+CASE = Path(__file__).with_name("harbour.nml").read_text()
+LIGHT = Path(__file__).with_name("harbour_light.nml").read_text()
 SLOPE = 2.0  # of the bed, run over rise
 FACET = 2.5  # edge of a cell of the bed, in heights of a block
 TOP = 1.5  # of the water over the highest place on the slope, in heights of a block
