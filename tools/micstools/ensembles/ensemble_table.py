@@ -7,7 +7,8 @@ from typing import Any
 
 from micstools import files
 from micstools.ensembles.ensemble import OUTCOMES, Member, Plan, State
-from micstools.reading.shares import in_words, wilson
+from micstools.reading.shares import in_words
+from micstools.reading.shares import table as share_table
 
 Table = Mapping[Member, State]
 
@@ -30,15 +31,7 @@ def rows(table: Table) -> list[dict[str, Any]]:
 def shares(table: Table) -> dict[str, dict[str, Any]]:
     """Count, share and its 95 % interval for each outcome, of the runs that are done."""
     counted = Counter(end.outcome for end in table.values() if end.counts)
-    total = counted.total()
-    return {
-        name: {
-            "count": counted[name],
-            "share": counted[name] / total if total else None,
-            "interval_95": list(wilson(counted[name], total)),
-        }
-        for name in OUTCOMES
-    }
+    return share_table(counted, counted.total(), OUTCOMES)
 
 
 def sentence(table: Table) -> str:

@@ -1,7 +1,8 @@
 """Diagrams of a run with matplotlib; every function returns a figure or writes one file."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -18,33 +19,96 @@ from micstools.shapes.geometry import Array
 MANY = 32  # blocks that have a line of their own in the legend
 DASHES = ("-", "--", ":", "-.")
 
-Panel = Callable[[Axes, Run], None]
+
+@dataclass(frozen=True)
+class Panel:
+    """A diagram against time."""
+
+    title: str
+    lines: tuple[tuple[Array, str, str, str], ...] = ()  # values (T), colour, dashes, name
+    blocks: Array | None = None  # (T, N) a line for each dropped block
+    limit: float | None = None  # to compare with
+    linear: float | None = None  # of a logarithmic axis the part that is linear, 0: none
+    zero: bool = False  # the axis begins there
+
+
+def _panels(run: Run) -> list[Panel]:
+    """Heights, speeds, forces, liquid, energies and the work of the solver."""
+    b, s, found = run.bodies, run.series, list[Panel]()
+    shown, red, blue, violet = units.of_run(run), "#d1495b", "#00798c", "#6a4c93"
+    force, length = shown.force, shown.length
+    if b.dropped.size:
+        heights, speeds = length.of(b.position[..., 2]), np.linalg.norm(b.velocity, axis=2)
+        found.append(Panel(f"height of the centroid, z [{length.name}]", blocks=heights))
+        found.append(Panel("speed [m/s]", blocks=speeds))
+    if b.n and run.field_times.size:
+        vertical = force.of(b.fluid_force[..., 2])
+        found.append(Panel(f"vertical force of the fluid [{force.name}]", blocks=vertical))
+    if b.n:
+        blows, share = np.linalg.norm(b.contact_force, axis=2), s.max_overlap / scales.smallest(run)
+        found.append(Panel(f"contact force [{force.name}]", blocks=force.of(blows), zero=True,
+                           linear=force.of(scales.weight(run)) or 1.0))  # fmt: skip
+        found.append(Panel("largest overlap [% of the smallest block's length]",
+                           ((100 * share, "#2e4057", "-", ""),)))  # fmt: skip
+        untouched = kicks.acceleration(run)
+        if np.isfinite(untouched).any():
+            title = "acceleration of untouched blocks under water [g], limit dashed"
+            found.append(Panel(title, blocks=untouched, limit=kicks.LIMIT, zero=True))
+    if np.isfinite(s.liquid_volume).any():
+        drift, limit = s.liquid_volume_drift, health.divergence_limit(run)
+        found.append(Panel("drift of the liquid volume [-]", ((drift, blue, "-", ""),)))
+        curve = (_positive(s.divergence_max), blue, "-", "")
+        title = "largest divergence [1/s], tolerance dashed"
+        found.append(Panel(title, (curve,), limit=limit, linear=0.0))
+    if np.isfinite(s.volume_excess_max).any():
+        curve = (_positive(s.volume_excess_max), blue, "-", "")
+        title = "largest excess of fluid in a cell [V], limit dashed"
+        found.append(Panel(title, (curve,), limit=EXCESS_LIMIT, linear=0.0))
+    energies = (
+        (s.kinetic_energy_bodies, red, "-", "kinetic, blocks"),
+        (s.kinetic_energy_fluid, blue, "--", "kinetic, fluid"),
+        (s.contact_energy, "#edae49", ":", "contact"),
+    )
+    told = tuple((shown.energy.of(values), *look) for values, *look in energies
+                 if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0)  # fmt: skip
+    found.append(Panel(f"energy [{shown.energy.name}]", told))
+    steps = np.where(s.time > s.time[0], 1e3 * s.dt, np.nan)
+    found.append(Panel("time step [ms]", ((steps, violet, "-", ""),), zero=True))
+    if np.isfinite(s.solver_iterations).any():
+        work = ((s.solver_iterations, violet, "-", "iterations"),
+                (s.pressure_passes, "#edae49", "-", "pressure passes"))  # fmt: skip
+        found.append(Panel("pressure solver, per step", work))
+    return found
+
+
+def _draw(axis: Axes, run: Run, panel: Panel) -> None:
+    if panel.blocks is not None:
+        _each_block(axis, run, panel.blocks)
+    for values, colour, dashes, name in panel.lines:
+        axis.plot(run.series.time, values, color=colour, ls=dashes, lw=0.8, label=name or None)
+    if panel.limit is not None:
+        axis.axhline(panel.limit, color="#d1495b", lw=0.8, ls="--")
+    if panel.linear is not None:
+        kind: dict[str, Any] = {"linthresh": panel.linear} if panel.linear else {}
+        axis.set_yscale("symlog" if panel.linear else "log", **kind)
+    if any(name for *_, name in panel.lines):  # beside the title, where no curve runs
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=7,
+                    frameon=False, borderpad=0)  # fmt: skip
+    if panel.zero:
+        axis.set_ylim(bottom=0)
+    axis.set_title(panel.title, loc="left")
 
 
 def history(run: Run) -> Figure:
     """Heights, speeds, forces, liquid, energies and the work of the solver against time."""
     matplotlib.rcParams.update({"font.size": 9, "axes.titlesize": 10, "axes.grid": True})
     matplotlib.rcParams.update({"grid.alpha": 0.3, "axes.spines.top": False})
-    panels: list[Panel] = []
-    if run.bodies.dropped.size:
-        panels += [_heights, _speeds]
-    if run.bodies.n:
-        panels += [_fluid_force, _contact_force] if run.field_times.size else [_contact_force]
-        panels += [_overlap]
-        if np.isfinite(kicks.acceleration(run)).any():
-            panels += [_untouched]
-    if np.isfinite(run.series.liquid_volume).any():
-        panels += [_liquid, _divergence]
-    if np.isfinite(run.series.volume_excess_max).any():
-        panels.append(_excess)
-    panels += [_energies, _steps]
-    if np.isfinite(run.series.solver_iterations).any():
-        panels.append(_solver)
+    panels = _panels(run)
     rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(11, 2.4 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, sharex=True, squeeze=False).ravel()
     for axis, panel in zip(axes, panels, strict=False):
-        panel(axis, run)
+        _draw(axis, run, panel)
     for axis in axes[len(panels) :]:
         axis.set_visible(False)
     for axis in axes[max(0, len(panels) - 2) : len(panels)]:
@@ -56,7 +120,7 @@ def history(run: Run) -> Figure:
     return figure
 
 
-def _each_block(axis: Axes, run: Run, values: Array, title: str) -> None:
+def _each_block(axis: Axes, run: Run, values: Array) -> None:
     """One line per dropped block, from its release on; `values` (T, N).
 
     Blocks have their colour of the pictures; the dashes, too, differ from one to the next, and with
@@ -73,7 +137,6 @@ def _each_block(axis: Axes, run: Run, values: Array, title: str) -> None:
             lw=1,
             label=f"{k + 1}",
         )
-    axis.set_title(title, loc="left")
 
 
 def _name_blocks(figure: Figure, axes: list[Axes], run: Run) -> None:
@@ -93,99 +156,6 @@ def _name_blocks(figure: Figure, axes: list[Axes], run: Run) -> None:
         handlelength=2.4,
         columnspacing=1.2,
     )
-
-
-def _legend_above(axis: Axes) -> None:
-    """The legend of a panel beside its title, where no curve runs."""
-    axis.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=3,
-        fontsize=7,
-        frameon=False,
-        borderpad=0,
-    )
-
-
-def _heights(axis: Axes, run: Run) -> None:
-    length = units.of_run(run).length
-    height = length.of(run.bodies.position[..., 2])
-    _each_block(axis, run, height, f"height of the centroid, z [{length.name}]")
-
-
-def _speeds(axis: Axes, run: Run) -> None:
-    _each_block(axis, run, np.linalg.norm(run.bodies.velocity, axis=2), "speed [m/s]")
-
-
-def _fluid_force(axis: Axes, run: Run) -> None:
-    unit = units.of_run(run).force
-    force = unit.of(run.bodies.fluid_force[..., 2])
-    _each_block(axis, run, force, f"vertical force of the fluid [{unit.name}]")
-
-
-def _contact_force(axis: Axes, run: Run) -> None:
-    unit = units.of_run(run).force
-    force = unit.of(np.linalg.norm(run.bodies.contact_force, axis=2))
-    _each_block(axis, run, force, f"contact force [{unit.name}]")
-    axis.set_yscale("symlog", linthresh=unit.of(scales.weight(run)) or 1.0)
-    axis.set_ylim(bottom=0)
-
-
-def _untouched(axis: Axes, run: Run) -> None:
-    title = "acceleration of untouched blocks under water [g], limit dashed"
-    _each_block(axis, run, kicks.acceleration(run), title)
-    axis.axhline(kicks.LIMIT, color="#d1495b", lw=0.8, ls="--")
-    axis.set_ylim(bottom=0)
-
-
-def _overlap(axis: Axes, run: Run) -> None:
-    share = 100 * run.series.max_overlap / scales.smallest(run)
-    axis.plot(run.series.time, share, color="#2e4057", lw=0.8)
-    axis.set_title("largest overlap [% of the smallest block's length]", loc="left")
-
-
-def _liquid(axis: Axes, run: Run) -> None:
-    axis.plot(run.series.time, run.series.liquid_volume_drift, color="#00798c", lw=0.8)
-    axis.set_title("drift of the liquid volume [-]", loc="left")
-
-
-def _excess(axis: Axes, run: Run) -> None:
-    axis.semilogy(run.series.time, _positive(run.series.volume_excess_max), color="#00798c", lw=0.8)
-    axis.axhline(EXCESS_LIMIT, color="#d1495b", lw=0.8, ls="--")
-    axis.set_title("largest excess of fluid in a cell [V], limit dashed", loc="left")
-
-
-def _divergence(axis: Axes, run: Run) -> None:
-    axis.semilogy(run.series.time, _positive(run.series.divergence_max), color="#00798c", lw=0.8)
-    axis.axhline(health.divergence_limit(run), color="#d1495b", lw=0.8, ls="--")
-    axis.set_title("largest divergence [1/s], tolerance dashed", loc="left")
-
-
-def _energies(axis: Axes, run: Run) -> None:
-    s, unit = run.series, units.of_run(run).energy
-    for values, label, colour, dashes in (
-        (s.kinetic_energy_bodies, "kinetic, blocks", "#d1495b", "-"),
-        (s.kinetic_energy_fluid, "kinetic, fluid", "#00798c", "--"),
-        (s.contact_energy, "contact", "#edae49", ":"),
-    ):
-        if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0:
-            axis.plot(s.time, unit.of(values), color=colour, ls=dashes, lw=1, label=label)
-    _legend_above(axis)
-    axis.set_title(f"energy [{unit.name}]", loc="left")
-
-
-def _steps(axis: Axes, run: Run) -> None:
-    axis.plot(run.series.time[1:], 1e3 * run.series.dt[1:], color="#6a4c93", lw=0.8)
-    axis.set_ylim(bottom=0)
-    axis.set_title("time step [ms]", loc="left")
-
-
-def _solver(axis: Axes, run: Run) -> None:
-    s = run.series
-    axis.plot(s.time, s.solver_iterations, color="#6a4c93", lw=0.6, label="iterations")
-    axis.plot(s.time, s.pressure_passes, color="#edae49", lw=0.8, label="pressure passes")
-    _legend_above(axis)
-    axis.set_title("pressure solver, per step", loc="left")
 
 
 def _positive(values: Array) -> Array:

@@ -20,6 +20,7 @@ from micstools.reading import block_numbers, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.places import TOLERANCE, Place, Survey, places
 from micstools.reading.reader import BadRun, Run
+from micstools.reading.shares import table as share_table
 from micstools.reading.shares import wilson
 from micstools.reading.units import Units
 from micstools.shapes.geometry import Array
@@ -200,15 +201,7 @@ def pattern(run: Run, found: PileNumbers) -> str:
 
 def pattern_shares(piles: Sequence[Pile]) -> dict[str, dict[str, Any]]:
     """Count, share and its 95 % interval of each pattern."""
-    counted, total = Counter(p.pattern for p in piles), len(piles)
-    return {
-        name: {
-            "count": counted[name],
-            "share": counted[name] / total if total else None,
-            "interval_95": list(wilson(counted[name], total)),
-        }
-        for name in PATTERNS
-    }
+    return share_table(Counter(p.pattern for p in piles), len(piles), PATTERNS)
 
 
 def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, float, float]]:

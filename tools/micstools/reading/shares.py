@@ -1,7 +1,10 @@
 """Shares of outcomes with their intervals."""
 
+from collections import Counter
+from collections.abc import Iterable
 from math import sqrt
 from statistics import NormalDist
+from typing import Any
 
 
 def wilson(count: int, total: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -23,3 +26,15 @@ def in_words(count: int, total: int) -> str:
     low, high = wilson(count, total)
     share = 100 * count / total if total else 0
     return f"{count} of {total} ({share:.0f} %, {100 * low:.0f} to {100 * high:.0f})"
+
+
+def table(counted: Counter[str], total: int, names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Count, share and its 95 % interval of each name."""
+    return {
+        name: {
+            "count": counted[name],
+            "share": counted[name] / total if total else None,
+            "interval_95": list(wilson(counted[name], total)),
+        }
+        for name in names
+    }
