@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from micstools.reading.reader import Run
-from run_cases import CASES, ROOT, Machine, run
+from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, run
 from same_bits import but_restarts, differences
 
 SharedRun = Callable[[str, Machine], Path]
@@ -37,13 +37,18 @@ def shared_run(tmp_path_factory: pytest.TempPathFactory) -> SharedRun:
     return results
 
 
+def call(*words: object, **settings) -> subprocess.CompletedProcess[str]:
+    """What a command said; it waits for no input. `more`: besides, in its environment."""
+    own = {**os.environ, **MPI_SETTINGS, **settings.pop("more", {})}
+    stdin = {} if "input" in settings else {"stdin": subprocess.DEVNULL}
+    usual = {"capture_output": True, "text": True, "timeout": 300, "env": own} | stdin
+    return subprocess.run(list(map(str, words)), **usual | settings)
+
+
 def program(*words: object, cwd: Path, **settings) -> subprocess.CompletedProcess[str]:
     """What the program said, called on one thread from a folder."""
     before, threads = settings.pop("before", ()), settings.pop("threads", 1)
-    stdin = {} if "input" in settings else {"stdin": subprocess.DEVNULL}
-    usual = {"capture_output": True, "text": True, "timeout": 300, "check": False} | stdin
-    command = [*before, ROOT / "mics", "--threads", threads, *words]
-    return subprocess.run(list(map(str, command)), cwd=cwd, **usual | settings)
+    return call(*before, ROOT / "mics", "--threads", threads, *words, cwd=cwd, **settings)
 
 
 def run_text(

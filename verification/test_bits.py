@@ -4,7 +4,6 @@ restart; and no fused multiply-add, which would make them hang on what the compi
 import os
 import re
 import shutil
-import subprocess
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -14,9 +13,9 @@ import numpy as np
 import pytest
 
 from micstools.reading.reader import Run
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, changed, prepare, run
+from run_cases import CASES, ROOT, Machine, changed, prepare, run
 from same_bits import contents, differences
-from shared_runs import SharedRun
+from shared_runs import SharedRun, call
 
 SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 ALONE, THREADS = Machine(SERIAL, threads=1), Machine(SERIAL, threads=2)
@@ -109,28 +108,16 @@ def test_waiting_gives_the_core_away(tmp_path: Path, shared_run: SharedRun) -> N
     plain = {name: os.environ[name] for name in os.environ if not name.startswith("OMPI_MCA_")}
     crowd = ["mpirun", "--timeout", "60", "--bind-to", "none"]  # s; one process alone takes one
     crowd += ["-host", f"localhost:{4 * n}", "-n", str(n)]
-    subprocess.run(
-        [*crowd, PARALLEL, "--quiet", "--output", tmp_path / "crowd", case],
-        env={**plain, "OMP_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        check=True,
-    )
+    call(*crowd, PARALLEL, "--quiet", "--output", tmp_path / "crowd", case,
+         env={**plain, "OMP_NUM_THREADS": "1"}, check=True)  # fmt: skip
     assert differences(shared_run("coupled", ALONE), tmp_path / "crowd") == []
 
 
 @cache
 def solutions(*command: str) -> list[str]:
     """The lines `solution NAME CELLS ITERATIONS CHECKSUM` of the test of multigrid."""
-    done = subprocess.run(
-        [*command, "multigrid"],
-        env={**os.environ, **MPI_SETTINGS},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
-    return [line for line in done.stdout.splitlines() if line.startswith("solution ")]
+    said = call(*command, "multigrid", check=True).stdout
+    return [line for line in said.splitlines() if line.startswith("solution ")]
 
 
 @several_processes
@@ -153,11 +140,6 @@ def test_no_fused_multiply_add(program: str) -> None:
     binary = ROOT / program
     if not binary.exists():
         pytest.skip(f"./{program} is not built")
-    code = subprocess.run(
-        [str(OBJDUMP), "-d", "--no-show-raw-insn", str(binary)],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
+    code = call(OBJDUMP, "-d", "--no-show-raw-insn", binary, check=True).stdout
     assert "mulpd" in code or "mulsd" in code or "fmul" in code
     assert FUSED.findall(code) == []

@@ -1,6 +1,5 @@
 """Good cases are accepted and bad ones refused: exit code, messages, and nothing written."""
 
-import os
 import re
 import resource
 import subprocess
@@ -11,7 +10,8 @@ import pytest
 
 from micstools.cases.initial_state import write_initial_state
 from micstools.reading.reader import Run
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, prepare
+from run_cases import CASES, ROOT, Machine, prepare
+from shared_runs import call
 
 INPUT = sorted((ROOT / "input").glob("*.nml"))
 GOOD = [*INPUT, *sorted(CASES.glob("*/*.nml"))]
@@ -32,16 +32,7 @@ def mics(
     arguments: list[str], folder: Path, text: str = "", machine: Machine = SERIAL
 ) -> subprocess.CompletedProcess[str]:
     """Run the program in a folder with the text as its standard input."""
-    return subprocess.run(
-        [*machine.command, *arguments],
-        cwd=folder,
-        env={**os.environ, **MPI_SETTINGS},
-        input=text,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    return call(*machine.command, *arguments, cwd=folder, input=text, timeout=60)
 
 
 @pytest.mark.parametrize("case", GOOD, ids=lambda path: f"{path.parent.name}/{path.name}")

@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from run_cases import ROOT
-from shared_runs import program
+from shared_runs import call, program
 
 MICS = ROOT / "mics"
 CASE = """&run t_end = 0.01  dt = 5.0e-3 /
@@ -94,9 +94,7 @@ def test_pipes_that_have_a_writer(tmp_path: Path) -> None:
         "{} --check < case.nml",
         "{} --check <(sleep 0.2; cat case.nml)",
     ):
-        done = subprocess.run(
-            ["bash", "-c", command.format(MICS)], cwd=tmp_path, capture_output=True, timeout=10
-        )
+        done = call("bash", "-c", command.format(MICS), cwd=tmp_path, timeout=10)
         assert done.returncode == 0, command
 
 
@@ -165,13 +163,11 @@ def test_remarks_and_titles_of_any_encoding(encoding: str, tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "mics-out" / "run.h5") as file:
         assert "title = 'Bl\xf6cke\xa05'\n" in file["provenance"].attrs["parameters"]
-    tools = {**os.environ, "PYTHONPATH": str(ROOT / "tools"), "PYTHONUTF8": "1"}
+    tools = {"PYTHONPATH": str(ROOT / "tools"), "PYTHONUTF8": "1"}
     plans = []
     for words in ([], ["--set", "run.t_end=0.01"]):
-        plan = subprocess.run(
-            [sys.executable, "-m", "micstools.cli", "check", "case.nml", *words],
-            cwd=tmp_path, env=tools, capture_output=True, text=True, timeout=60,
-        )  # fmt: skip
+        command = (sys.executable, "-m", "micstools.cli", "check", "case.nml", *words)
+        plan = call(*command, cwd=tmp_path, more=tools)
         assert plan.returncode == 0, plan.stderr
         plans.append(re.sub(" of .* that this machine has left", "", plan.stdout))
     assert plans[0] == plans[1]
@@ -183,10 +179,8 @@ def test_threads_of_the_environment(given: str, code: int, tmp_path: Path) -> No
     """OMP_NUM_THREADS has the bounds of --threads, which goes before it."""
     (tmp_path / "case.nml").write_text(case())
     for words, wanted in (([], code), (["--threads", "1"], 0)):
-        done = subprocess.run(
-            [MICS, "--check", *words, "case.nml"], cwd=tmp_path, text=True, capture_output=True,
-            env={**os.environ, "OMP_NUM_THREADS": given}, timeout=10,
-        )  # fmt: skip
+        done = call(MICS, "--check", *words, "case.nml", cwd=tmp_path, timeout=10,
+                    more={"OMP_NUM_THREADS": given})  # fmt: skip
         assert done.returncode == wanted, done.stderr
         assert wanted == 0 or "OMP_NUM_THREADS = " in done.stderr
 

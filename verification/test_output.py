@@ -20,7 +20,7 @@ from micstools.reading.reader import Run
 from micstools.shapes.geometry import rotation_matrix
 from run_cases import CASES, ROOT, Machine
 from same_bits import but_restarts, differences
-from shared_runs import SharedRun
+from shared_runs import SharedRun, call
 
 MICS = ROOT / "mics"
 ALONE = Machine(MICS, threads=1)
@@ -451,12 +451,8 @@ def test_max_wall(wet: Path, tmp_path: Path) -> None:
     """A run ends in good order before its wall time is over, and says how to go on."""
     output = tmp_path / "run"
     began = time.monotonic()
-    run = subprocess.run(
-        [MICS, "--max-wall", "0:00:01", "--threads", "1", "--quiet", "--output", output, LONG],
-        capture_output=True,
-        timeout=60,
-        text=True,
-    )
+    limit = ("--max-wall", "0:00:01", "--threads", "1", "--quiet", "--output")
+    run = call(MICS, *limit, output, LONG, timeout=60)
     assert run.returncode == 143
     assert "stopped as --max-wall asks" in run.stderr
     assert time.monotonic() - began < 5.0

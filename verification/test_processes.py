@@ -1,15 +1,14 @@
 """What processes cost: messages that do not grow with the blocks, a share of the memory each."""
 
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import h5py
 import pytest
 
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, run
+from run_cases import CASES, ROOT, Machine, run
+from shared_runs import call
 
 SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 pytestmark = pytest.mark.xdist_group("ranks")
@@ -55,12 +54,7 @@ def peaks(case: Path, ranks: int) -> list[int]:
     own = case.with_suffix(f".memory-{ranks}")
     start = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(ranks)]
     program = [str(PARALLEL), "--quiet", "--output", f"{own}-run", str(case)]
-    subprocess.run(
-        [*start, sys.executable, "-c", MEASURE, str(own), *program],
-        env={**os.environ, **MPI_SETTINGS, "OMP_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        check=True,
-    )
+    call(*start, sys.executable, "-c", MEASURE, own, *program, check=True)
     return [int(Path(f"{own}.{rank}").read_text()) for rank in range(ranks)]
 
 

@@ -4,12 +4,12 @@ The tests of a folder are one program, which runs that of its argument: `test_bl
 that holds the comment line `! ranks: 2 4` is also run by mpirun on 2 and on 4 processes.
 """
 
-import os
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from shared_runs import call
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted((ROOT / "verification" / "unit").glob("*/test_*.f90"))
@@ -26,15 +26,8 @@ def ranks(source: Path) -> list[int]:
 def run(source: Path, build: str, folder: Path, launcher: tuple[str, ...] = ()) -> None:
     """Run a unit test; its output is shown when it fails."""
     program = ROOT / "build" / build / f"test_{source.parent.name}"
-    done = subprocess.run(
-        [*launcher, program, source.stem.removeprefix("test_")],
-        cwd=folder,
-        env={**os.environ, **THREADS},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+    name = source.stem.removeprefix("test_")
+    done = call(*launcher, program, name, cwd=folder, more=THREADS)
     assert done.returncode == 0, f"\n{done.stdout}\n{done.stderr}"
     assert re.search(r"^[1-9]\d* passed, 0 failed$", done.stdout, re.MULTILINE), done.stdout
 

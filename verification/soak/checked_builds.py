@@ -7,9 +7,7 @@ under valgrind (uninitialised memory), and is continued from its restart file. E
 code 0 and no word on standard error but the program's own.
 """
 
-import os
 import shutil
-import subprocess
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,6 +17,7 @@ import f90nml
 
 from run_cases import CASES, ROOT, changed, prepare
 from run_soak import Given
+from shared_runs import call
 from soak.shop import restart_files
 
 STEPS = 3
@@ -62,15 +61,8 @@ def shortened(text: str) -> tuple[str, str, int]:
 
 def run(check: Check, words: list[str], work: Path) -> str:
     """What is wrong with a run in a folder; empty if nothing is."""
-    done = subprocess.run(
-        [*check.command, "--quiet", "--max-wall", "0:01:00", *words],
-        cwd=work,
-        env={**os.environ, **SETTINGS},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        errors="replace",
-    )
+    command = (*check.command, "--quiet", "--max-wall", "0:01:00")
+    done = call(*command, *words, cwd=work, more=SETTINGS, errors="replace", timeout=None)
     foreign = [row for row in done.stderr.splitlines() if not row.startswith(("mics: ", "  "))]
     if done.returncode not in (0, 143) or foreign:
         return f"{' '.join(words)}: code {done.returncode}: {done.stderr[:2000]}"
