@@ -8,7 +8,7 @@ module simulation_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
   use liquid_fill_m, only: fill_liquid
-  use initial_state_m, only: read_initial_liquid, read_initial_velocity
+  use initial_state_m, only: read_initial_state
   use extended_fraction_m, only: extend_fraction
   use fluid_transport_m, only: fluid_transport_t, fluid_transport_init
   use mixture_m, only: mix_fluid
@@ -104,15 +104,14 @@ contains
     call choose_coupling(case, n_solids, sim)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
-    call read_initial_liquid(case%fluid, sim%grid, sim%flow)
-    call extend_fraction(sim%grid, sim%solid, sim%transport%liquid%extension, sim%flow)
-    call mix_fluid(case%fluid, sim%flow)
     do d = 1, 3
       sim%flow%u(:, :, :, d) = case%fluid%velocity(d)
       sim%flow%uf(:, :, :, d) = case%fluid%velocity(d)
     end do
     call fill_velocity_halo(sim%grid, sim%flow%u)
-    call read_initial_velocity(case%fluid, sim%grid, sim%flow)
+    call read_initial_state(case%fluid, sim%grid, sim%flow)
+    call extend_fraction(sim%grid, sim%solid, sim%transport%liquid%extension, sim%flow)
+    call mix_fluid(case%fluid, sim%flow)
     call set_side_velocity(sim%grid, sim%flow%uf)
     call outflow_init(sim%grid, case%fluid, sim%flow%sides)
     call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)

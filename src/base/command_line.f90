@@ -170,31 +170,23 @@ contains
     character(*), intent(in) :: value
     type(options_t), intent(inout) :: options
     type(problems_t), intent(inout) :: problems
-    integer, parameter :: max_hours = 100000
-    integer :: colon, again, h, m, s, info(3)
+    integer, parameter :: most(3) = [100000, 59, 59]
+    integer :: part(3), i, first, colon, info
 
+    part = 0
+    first = 1
     info = value_ok
-    h = 0
-    m = 0
-    s = 0
-    colon = index(value, ':')
-    again = index(value, ':', back=.true.)
-    if (colon == 0) then
-      info = value_ok + 1
-    else
-      call parse_integer(value(:colon - 1), h, info(1))
-      if (again == colon) then
-        call parse_integer(value(colon + 1:), m, info(2))
-      else
-        call parse_integer(value(colon + 1:again - 1), m, info(2))
-        call parse_integer(value(again + 1:), s, info(3))
-      end if
-    end if
-    if (any(info /= value_ok) .or. h < 0 .or. h > max_hours .or. m < 0 .or. m > 59 &
-        .or. s < 0 .or. s > 59 .or. h + m + s == 0) then
+    do i = 1, 3
+      if (first > len(value) + 1 .or. info /= value_ok) exit
+      colon = index(value(first:)//':', ':') + first - 1
+      call parse_integer(value(first:colon - 1), part(i), info)
+      first = colon + 1
+    end do
+    if (info /= value_ok .or. index(value, ':') == 0 .or. first <= len(value) + 1 &
+        .or. any(part < 0 .or. part > most) .or. all(part == 0)) then
       call problems%add('--max-wall', value, 'must be a time HH:MM or HH:MM:SS above 0:00')
     else
-      options%max_wall = 3600.0_wp*h + 60.0_wp*m + s
+      options%max_wall = 3600.0_wp*part(1) + 60.0_wp*part(2) + part(3)
     end if
   end subroutine take_max_wall
 

@@ -13,6 +13,7 @@ module file_words_m
   public :: expected, report, place_of
 
   integer, parameter :: longest_text = 500000000   !! bytes
+  character(*), parameter :: line_feed = achar(10), blanks = ' '//achar(9)//achar(13)//line_feed
 
   !> A text that is read word by word; after a problem nothing more is read.
   type :: words_t
@@ -56,28 +57,19 @@ contains
       if (index(words%text, byte_order_mark) == 1) words%at = len(byte_order_mark) + 1
     end if
     do while (words%at <= len(words%text))
-      select case (words%text(words%at:words%at))
-      case (' ', achar(9), achar(13))
-        words%at = words%at + 1
-      case (achar(10))
-        words%at = words%at + 1
-        words%line = words%line + 1
-      case ('#')
-        do while (words%at <= len(words%text))
-          if (words%text(words%at:words%at) == achar(10)) exit
-          words%at = words%at + 1
-        end do
-      case default
-        exit
-      end select
+      associate (c => words%text(words%at:words%at))
+        if (c == '#') then
+          call skip_line(words)
+          cycle
+        end if
+        if (scan(c, blanks) == 0) exit
+        if (c == line_feed) words%line = words%line + 1
+      end associate
+      words%at = words%at + 1
     end do
     first = words%at
-    do while (words%at <= len(words%text))
-      select case (words%text(words%at:words%at))
-      case (' ', achar(9), achar(10), achar(13)); exit
-      case default; words%at = words%at + 1
-      end select
-    end do
+    words%at = first - 1 + scan(words%text(first:), blanks)
+    if (words%at < first) words%at = len(words%text) + 1
     word = words%text(first:words%at - 1)
   end function next_word
 
@@ -87,7 +79,7 @@ contains
     integer :: rest
 
     if (len(words%problem) > 0 .or. words%at > len(words%text)) return
-    rest = index(words%text(words%at:), achar(10))
+    rest = index(words%text(words%at:), line_feed)
     words%at = merge(words%at + rest - 1, len(words%text) + 1, rest > 0)
   end subroutine skip_line
 

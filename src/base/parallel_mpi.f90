@@ -127,11 +127,10 @@ contains
                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call box_of_layers(extent, width, layers, e, from, to)
-      bytes = product(to - from + 1)*storage_size(box)/8
-      call expect_layers(e, bytes)
       do s = 1, 2
-        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
+        bytes = product(to - from + 1)*storage_size(box)/8
+        if (s == 1) call expect_layers(e, bytes)
         call c_f_pointer(outgoing(s), box, to - from + 1)
         box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
@@ -139,7 +138,7 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
         call c_f_pointer(incoming(s), box, to - from + 1)
         a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
@@ -156,11 +155,10 @@ contains
                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call box_of_layers(extent, width, layers, e, from, to)
-      bytes = product(to - from + 1)*storage_size(box)/8
-      call expect_layers(e, bytes)
       do s = 1, 2
-        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
+        bytes = product(to - from + 1)*storage_size(box)/8
+        if (s == 1) call expect_layers(e, bytes)
         call c_f_pointer(outgoing(s), box, to - from + 1)
         box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
@@ -168,7 +166,7 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
         call c_f_pointer(incoming(s), box, to - from + 1)
         a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
@@ -185,11 +183,10 @@ contains
                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call box_of_layers(extent, width, layers, e, from, to)
-      bytes = product(to - from + 1)*storage_size(box)/8
-      call expect_layers(e, bytes)
       do s = 1, 2
-        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
+        bytes = product(to - from + 1)*storage_size(box)/8
+        if (s == 1) call expect_layers(e, bytes)
         call c_f_pointer(outgoing(s), box, to - from + 1)
         box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
         call send_layers(e, s, bytes)
@@ -197,32 +194,24 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
         call c_f_pointer(incoming(s), box, to - from + 1)
         a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
       end do
     end do
   end procedure fill_integer
 
-  !> Corners of the layers that pass in direction e: all of the block in the other directions, with
-  !! as many layers of its halos.
-  pure subroutine box_of_layers(extent, width, layers, e, from, to)
-    integer, intent(in) :: extent(4), width, layers, e
+  !> Corners of the layers from `first` on that pass in direction e: all of the block in the other
+  !! directions, with as many layers of its halos.
+  pure subroutine box_of_layers(extent, width, layers, e, first, from, to)
+    integer, intent(in) :: extent(4), width, layers, e, first
     integer, intent(out) :: from(4), to(4)
 
     from = [width - layers + [1, 1, 1], 1]
     to = [extent(:3) - width + layers, extent(4)]
-    call shift_box(e, 1, layers, from, to)
-  end subroutine box_of_layers
-
-  !> The same box with its layers from `first` on in direction e.
-  pure subroutine shift_box(e, first, layers, from, to)
-    integer, intent(in) :: e, first, layers
-    integer, intent(inout) :: from(4), to(4)
-
     from(e) = first
     to(e) = first + layers - 1
-  end subroutine shift_box
+  end subroutine box_of_layers
 
   !> Get ready for layers of so many bytes through the two sides of direction e.
   !!

@@ -22,8 +22,8 @@ module signals_m
   integer, parameter :: signal_terminate = 15   !! SIGTERM
   integer, parameter :: signal_cpu_time = 24    !! SIGXCPU
   integer, parameter :: signal_file_size = 25   !! SIGXFSZ
-  integer, parameter :: ends_a_run(6) = [signal_hang_up, signal_interrupt, signal_user, &
-    signal_pipe, signal_terminate, signal_cpu_time]
+  integer, parameter :: caught_here(*) = [signal_hang_up, signal_interrupt, signal_user, &
+    signal_pipe, signal_terminate, signal_cpu_time, signal_file_size]
 
   integer(c_int), volatile :: caught = 0
 
@@ -34,10 +34,9 @@ contains
     type(c_funptr) :: previous
     integer :: i
 
-    do i = 1, size(ends_a_run)
-      previous = c_signal(int(ends_a_run(i), c_int), c_funloc(remember))
+    do i = 1, size(caught_here)
+      previous = c_signal(int(caught_here(i), c_int), c_funloc(remember))
     end do
-    previous = c_signal(int(signal_file_size, c_int), c_funloc(remember))
   end subroutine catch_signals
 
   !> The signal that any process caught, or zero; all processes call this and get the same answer.

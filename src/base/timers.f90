@@ -6,7 +6,7 @@ module timers_m
   use kinds_m, only: wp, i8, name_length
   implicit none
   private
-  public :: timer, tic, toc, wall_clock, phases
+  public :: timer, tic, toc, wall_clock
 
   integer, parameter :: max_timers = 64
 
@@ -17,8 +17,8 @@ module timers_m
     integer :: calls = 0
   end type phase_t
 
-  type(phase_t) :: phase(max_timers)
-  integer :: n_phases = 0
+  type(phase_t), public, protected :: phase(max_timers)   !! `n_phases` of them
+  integer, public, protected :: n_phases = 0
 
 contains
 
@@ -59,12 +59,5 @@ contains
     call system_clock(ticks, rate)
     seconds = real(ticks, wp)/real(rate, wp)
   end function wall_clock
-
-  !> The phases so far.
-  function phases() result(so_far)
-    type(phase_t) :: so_far(n_phases)
-
-    so_far = phase(:n_phases)
-  end function phases
 
 end module timers_m

@@ -74,7 +74,7 @@ contains
     integer, intent(inout) :: n       !! changed only when `info` is `value_ok`
     integer, intent(out) :: info
     integer(i8) :: total
-    integer :: i, digit, first
+    integer :: i, digit
     real(wp) :: x
 
     info = value_malformed
@@ -85,9 +85,7 @@ contains
     end if
     info = value_too_large
     total = 0_i8
-    first = 1
-    if (scan(text(1:1), '+-') == 1) first = 2
-    do i = first, len(text)
+    do i = first_digit(text), len(text)
       digit = iachar(text(i:i)) - iachar('0')
       total = 10_i8*total + int(digit, i8)
       if (total > int(huge(n), i8)) return
@@ -246,34 +244,30 @@ contains
   pure function is_not_finite(word) result(yes)
     character(*), intent(in) :: word  !! small letters
     logical :: yes
-    integer :: first
 
-    first = 1
-    if (len(word) > 0) then
-      if (scan(word(1:1), '+-') == 1) first = 2
-    end if
-    select case (word(first:))
+    select case (word(first_digit(word):))
     case ('nan', 'inf', 'infinity'); yes = .true.
-    case default; yes = index(word(first:), 'nan(') == 1
+    case default; yes = index(word(first_digit(word):), 'nan(') == 1
     end select
   end function is_not_finite
+
+  !> Place behind a sign.
+  pure integer function first_digit(word)
+    character(*), intent(in) :: word
+
+    first_digit = merge(2, 1, scan(word, '+-') == 1)
+  end function first_digit
 
   !> Optional sign, digits with at most one point, at least one digit?
   pure function is_decimal(word) result(yes)
     character(*), intent(in) :: word
     logical :: yes
-    integer :: i, first, points
+    integer :: i, points
 
-    first = 1
-    if (len(word) > 0) then
-      if (scan(word(1:1), '+-') == 1) first = 2
-    end if
-    points = 0
-    do i = first, len(word)
-      if (word(i:i) == '.') points = points + 1
-    end do
-    yes = verify(word(first:), '0123456789.') == 0 .and. points <= 1 &
-      .and. len(word) - first + 1 > points
+    associate (digits => word(first_digit(word):))
+      points = count([(digits(i:i) == '.', i=1, len(digits))])
+      yes = verify(digits, '0123456789.') == 0 .and. points <= 1 .and. len(digits) > points
+    end associate
   end function is_decimal
 
   !> Optional sign and at least one digit, nothing else?

@@ -9,7 +9,7 @@ module case_blocks_m
   use rigid_body_m, only: blocks_t, release_body, to_come
   implicit none
   private
-  public :: blocks_init, turn_with_fluid, turning_share
+  public :: height_at_level, blocks_init, turn_with_fluid, turning_share
 
   real(wp), parameter :: turning_share = 0.02_wp
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of

@@ -14,7 +14,7 @@ module case_input_m
   use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: group_text_t, cut_groups
   use string_builder_m, only: string_builder_t
-  use entries_m, only: words_of
+  use allowed_values_m, only: words_of
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: visit_run, visit_grid, visit_boundary, side_name
   use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics

@@ -10,8 +10,7 @@
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use allowed_values_m, only: allowed_t
-  use entries_m, only: entry_t, words_of, choices
+  use allowed_values_m, only: allowed_t, entry_t, words_of, choices
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &

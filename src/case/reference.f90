@@ -1,6 +1,6 @@
 !> The reference of the case file: each variable of each group by the reading procedures.
 module reference_m
-  use entries_m, only: entry_t, choices, words_of
+  use allowed_values_m, only: entry_t, choices, words_of
   use group_visitor_m, only: group_visitor_t
   use string_builder_m, only: string_builder_t
   use case_input_m, only: group_names, is_repeated, list_entries

@@ -7,7 +7,7 @@ module schema_m
   use kinds_m, only: name_length
   use errors_m, only: to_text
   use string_builder_m, only: string_builder_t
-  use entries_m, only: entry_t
+  use allowed_values_m, only: entry_t
   use group_visitor_m, only: group_visitor_t
   use case_input_m, only: group_names, is_repeated, list_entries
   implicit none

@@ -6,7 +6,6 @@
 module liquid_sweep_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
-  use swap_m, only: swap
   use growing_m, only: ensure_capacity
   use case_types_m, only: absent, is_given
   use grid_m, only: grid_t, n_halo, unit_step
@@ -69,6 +68,7 @@ contains
     type(carried_volumes_t), intent(inout) :: volumes
     type(liquid_sweep_t), intent(inout) :: self
     integer :: i, j, k, e(3), s, a(3), b(3)
+    real(wp), allocatable :: spare(:, :, :)
     real(wp) :: share
 
     ! Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit. Rests at
@@ -108,8 +108,12 @@ contains
         end do
       end do
     end do
-    call swap(volumes%w, volumes%w_before)
-    call swap(volumes%v, volumes%v_before)
+    call move_alloc(volumes%w_before, spare)   ! change places
+    call move_alloc(volumes%w, volumes%w_before)
+    call move_alloc(spare, volumes%w)
+    call move_alloc(volumes%v_before, spare)
+    call move_alloc(volumes%v, volumes%v_before)
+    call move_alloc(spare, volumes%v)
     call move_volumes(grid, old, d, self, volumes)
     call fill_scalar_halo(grid, volumes%v)
     call fill_scalar_halo(grid, volumes%c)

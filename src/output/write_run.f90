@@ -5,7 +5,7 @@
 module write_run_m
   use kinds_m, only: wp
   use parallel_m, only: is_root, nproc, get_threads
-  use timers_m, only: phases
+  use timers_m, only: phase, n_phases
   use build_info_m, only: version, git_revision, compiler, flags
   use rigid_body_m, only: blocks_t, own_mass
   use bed_m, only: bed_t
@@ -226,13 +226,13 @@ contains
     integer, intent(in) :: exit_status
 
     if (.not. is_root()) return
-    associate (file => self%file, phase => phases())
+    associate (file => self%file, phases => phase(:n_phases))
       call file%reserve(6*bytes_for_change)
       if (file%has('/timers')) call file%remove('/timers')
       call file%group('/timers')
-      call file%store('/timers/name', '1', phase%name)
-      call file%store('/timers/seconds', 's', phase%seconds)
-      call file%store('/timers/calls', '1', phase%calls)
+      call file%store('/timers/name', '1', phases%name)
+      call file%store('/timers/seconds', 's', phases%seconds)
+      call file%store('/timers/calls', '1', phases%calls)
       call file%attribute('/provenance', 'finished', time_now())
       call file%last_integer('/provenance', 'exit_status', merge(exit_status, exit_files, &
         file%info == 0))

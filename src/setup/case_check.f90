@@ -5,15 +5,15 @@
 module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
-  use vectors_m, only: rotation_matrix
   use case_types_m, only: case_t, place_t, is_given, smallest_spacing, has_flow
   use boundary_kinds_m, only: side_code, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
-  use tet_mesh_m, only: shape_t, is_called, extent_along
+  use tet_mesh_m, only: shape_t, is_called
   use shapes_builtin_m, only: make_shape, given_size
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
+  use case_blocks_m, only: height_at_level
   use start_bodies_m, only: with_begun
   use given_motion_m, only: pose_at, fastest_between
   use bed_m, only: bed_t
@@ -308,7 +308,8 @@ contains
         hangs = .not. (is_given(place%x(3)) .or. scene%walls%bed%there &
                        .or. is_wall(side_code(case%boundary%kind(1, 3))))
         if (.not. is_given(place%x(3)) .or. drop%handling%if_blocked == 'raise') then
-          place%x(3) = highest_place(case, scene, b)
+          place%x(3) = height_at_level(case, scene%blocks%shapes(scene%blocks%shape(b)), place%q, &
+                                       at_water=.false.)
         end if
         scene%blocks%x(:, b) = place%x
         reason = hindrance(case, scene, b)
@@ -332,26 +333,6 @@ contains
         drop%line)
     end associate
   end subroutine check_drop
-
-  !> Height of the centre of body b with its lowest point at the top of the tank, or its highest one
-  !! where there is a lid [m].
-  pure function highest_place(case, scene, b) result(height)
-    type(case_t), intent(in) :: case
-    type(scene_t), intent(in) :: scene
-    integer, intent(in) :: b
-    real(wp) :: height
-    real(wp) :: turn(3, 3)
-
-    turn = rotation_matrix(scene%blocks%q(:, b))
-    height = case%grid%origin(3) + case%grid%length(3)
-    associate (shape => scene%blocks%shapes(scene%blocks%shape(b)))
-      if (is_wall(side_code(case%boundary%kind(2, 3)))) then
-        height = height - extent_along(shape, turn(3, :))
-      else
-        height = height + extent_along(shape, -turn(3, :))
-      end if
-    end associate
-  end function highest_place
 
   !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
   function hindrance(case, scene, b) result(text)
@@ -385,6 +366,7 @@ contains
     type(problems_t), intent(inout) :: problems
     character(:), allocatable :: cure
     real(wp) :: edge, width(size(shapes))    ! largest of a cell, of the shapes [m]
+    real(wp) :: box(3)                       ! edges [m]
     integer :: s, i
 
     if (case%run%physics /= 'coupled') return
@@ -392,8 +374,10 @@ contains
     edge = maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
     cure = ''
     width = sqrt(huge(width))   ! of a faulty shape: wide enough, without an overflow below
-    do s = 1, size(shapes)
-      if (shapes(s)%volume > 0.0_wp) width(s) = width_of(shapes(s))
+    do s = 1, size(shapes)   ! the middle edge of the box around it: plates fall safely, rods do not
+      if (shapes(s)%volume <= 0.0_wp) cycle
+      box = maxval(shapes(s)%point, 2) - minval(shapes(s)%point, 2)
+      width(s) = sum(box) - minval(box) - maxval(box)
     end do
     do s = 1, size(shapes)
       if (width(s)*(1.0_wp + 1.0e-9_wp) >= min_cells_wide*edge) cycle   ! round-off apart
@@ -412,16 +396,5 @@ contains
         //'''light'', or a '//cure, case%shape(s)%line)
     end do
   end subroutine check_widths
-
-  !> Width of a shape: the middle one of the three edges of the box around it [m]. Plates thinner
-  !! than a cell fall safely, rods do not.
-  pure function width_of(shape) result(width)
-    type(shape_t), intent(in) :: shape
-    real(wp) :: width
-    real(wp) :: edge(3)
-
-    edge = maxval(shape%point, 2) - minval(shape%point, 2)
-    width = sum(edge) - minval(edge) - maxval(edge)
-  end function width_of
 
 end module case_check_m

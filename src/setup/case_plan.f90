@@ -18,7 +18,7 @@ module case_plan_m
   use wave_step_m, only: gravity_step, capillary_step, viscous_step
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
-  use plan_text_m, only: heading, entry, left, right, triple, place_text, count_text
+  use plan_text_m, only: heading, entry, left, triple, place_text, count_text
   use bed_measure_m, only: bed_volume
   use panel_method_m, only: added_inertia_t
   use light_m, only: added_inertia_of
@@ -200,10 +200,8 @@ contains
       smallest = 2*minval(shapes(s)%sphere_radius)
       if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
       write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
-        right(to_text(size(shapes(s)%tet, 2)), 7), &
-        right(to_text(n_points(s)), 7), right(brief(smallest), 12), &
-        right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
-        right(brief(mass*g), 12), right(submerged, 13)
+        to_text(size(shapes(s)%tet, 2)), to_text(n_points(s)), brief(smallest), &
+        brief(shapes(s)%volume), brief(mass), brief(mass*g), submerged
     end do
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') call entry(unit, trim(shapes(s)%name)//' from', &
@@ -442,20 +440,18 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
-    character(:), allocatable :: there
+    character(:), allocatable :: text
     integer(i8) :: planned, available
 
     planned = planned_memory(case, shapes, bed)
     available = available_memory()
-    there = size_text(real(available, wp))//' that this machine has left'
+    text = size_text(real(planned, wp))
+    if (planned > available .and. available > 0) text = text//', MORE than the'
+    if (planned <= available) text = text//' of'
+    if (available > 0) text = text//' '//size_text(real(available, wp)) &
+      //' that this machine has left'
     call heading(unit, 'Memory')
-    if (available <= 0) then
-      call entry(unit, 'about', size_text(real(planned, wp)))
-    else if (planned > available) then
-      call entry(unit, 'about', size_text(real(planned, wp))//', MORE than the '//there)
-    else
-      call entry(unit, 'about', size_text(real(planned, wp))//' of '//there)
-    end if
+    call entry(unit, 'about', text)
   end subroutine print_memory
 
   !> Files to come, with upper bounds of their size (fields and surfaces are compressed).

@@ -23,7 +23,7 @@ module initial_state_m
   use value_text_m, only: quoted_text
   implicit none
   private
-  public :: check_initial_state, read_initial_liquid, read_initial_velocity
+  public :: check_initial_state, read_initial_state
 
   character(*), parameter :: liquid_name = 'liquid', velocity_name = 'velocity'
   real(wp), parameter :: fastest = 1.0e20_wp   !! as in a case [m/s]
@@ -128,36 +128,10 @@ contains
     if (allocated(fluid%initial_state)) is_named = len_trim(fluid%initial_state) > 0
   end function is_named
 
-  !> Liquid of the open part of every own cell, halo filled, and the initial volume, if the file
-  !! gives it; the fluid volume of the cells must be set.
-  subroutine read_initial_liquid(fluid, grid, flow)
-    type(fluid_t), intent(in) :: fluid
-    type(grid_t), intent(in) :: grid
-    type(flow_t), intent(inout) :: flow
-    type(h5_file_t) :: file
-    real(wp), allocatable :: part(:)
-    integer :: extent(3)
-
-    if (.not. is_named(fluid)) return
-    call file%open(found_file(fluid%initial_state), .false., .false.)
-    if (file%has(liquid_name)) then
-      extent = grid%hi - grid%lo + 1
-      allocate (part(product(extent)), source=0.0_wp)
-      call file%read_block(liquid_name, grid%lo, extent, part)
-      associate (a => grid%lo, b => grid%hi)
-        flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) = &
-          flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3)) &
-          *reshape(part, extent)
-      end associate
-      call fill_scalar_halo(grid, flow%liquid)
-      flow%liquid_initial = liquid_volume(grid, flow%liquid)
-    end if
-    call file%close()
-    if (file%info /= 0) call fatal(exit_files, file%message)
-  end subroutine read_initial_liquid
-
-  !> Velocity of the cells, halo filled, and of the faces, if the file gives it.
-  subroutine read_initial_velocity(fluid, grid, flow)
+  !> What the file gives, if the case names one, halos filled: the liquid of the open part of every
+  !! own cell, whose fluid volume must be set, with the initial volume; the velocity of cells and
+  !! faces.
+  subroutine read_initial_state(fluid, grid, flow)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(inout) :: flow
@@ -167,31 +141,38 @@ contains
 
     if (.not. is_named(fluid)) return
     call file%open(found_file(fluid%initial_state), .false., .false.)
-    if (file%has(velocity_name)) then
-      extent = grid%hi - grid%lo + 1
-      allocate (part(3*product(extent)), source=0.0_wp)
-      call file%read_block(velocity_name, [1, grid%lo], [3, extent], part)
-      values = reshape(part, [3, extent])
-      associate (a => grid%lo, b => grid%hi)
+    extent = grid%hi - grid%lo + 1
+    allocate (part(3*product(extent)), source=0.0_wp)
+    associate (a => grid%lo, b => grid%hi, n => product(extent))
+      if (file%has(liquid_name)) then
+        call file%read_block(liquid_name, a, extent, part(:n))
+        flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) = &
+          flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))*reshape(part(:n), extent)
+        call fill_scalar_halo(grid, flow%liquid)
+        flow%liquid_initial = liquid_volume(grid, flow%liquid)
+      end if
+      if (file%has(velocity_name)) then
+        call file%read_block(velocity_name, [1, a], [3, extent], part)
+        values = reshape(part, [3, extent])
         do d = 1, 3
           flow%u(a(1):b(1), a(2):b(2), a(3):b(3), d) = values(d, :, :, :)
         end do
-      end associate
-      call fill_velocity_halo(grid, flow%u)
-      do d = 1, 3   ! of the faces: mean of the two cells; the halo makes it that of the wall there
-        e = unit_step(:, d)
-        do k = grid%first(3) + 1, grid%last(3)
-          do j = grid%first(2) + 1, grid%last(2)
-            do i = grid%first(1) + 1, grid%last(1)
-              flow%uf(i, j, k, d) = 0.5_wp*(flow%u(i - e(1), j - e(2), k - e(3), d) &
-                                            + flow%u(i, j, k, d))
+        call fill_velocity_halo(grid, flow%u)
+        do d = 1, 3   ! of the faces: mean of two cells; the halo makes it that of the wall there
+          e = unit_step(:, d)
+          do k = grid%first(3) + 1, grid%last(3)
+            do j = grid%first(2) + 1, grid%last(2)
+              do i = grid%first(1) + 1, grid%last(1)
+                flow%uf(i, j, k, d) = 0.5_wp*(flow%u(i - e(1), j - e(2), k - e(3), d) &
+                                              + flow%u(i, j, k, d))
+              end do
             end do
           end do
         end do
-      end do
-    end if
+      end if
+    end associate
     call file%close()
     if (file%info /= 0) call fatal(exit_files, file%message)
-  end subroutine read_initial_velocity
+  end subroutine read_initial_state
 
 end module initial_state_m

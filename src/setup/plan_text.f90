@@ -5,7 +5,7 @@ module plan_text_m
   use value_text_m, only: fixed_text
   implicit none
   private
-  public :: heading, entry, left, right, triple, place_text, count_text
+  public :: heading, entry, left, triple, place_text, count_text
 
   integer, parameter :: label_width = 24      !! columns of the names
 
@@ -34,16 +34,6 @@ contains
 
     filled = text
   end function left
-
-  !> Text with blanks in front of it.
-  pure function right(text, width) result(filled)
-    character(*), intent(in) :: text
-    integer, intent(in) :: width
-    character(width) :: filled
-
-    filled = text
-    filled = adjustr(filled)
-  end function right
 
   !> Three numbers.
   pure function triple(x, between) result(text)
