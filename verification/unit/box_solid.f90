@@ -1,9 +1,8 @@
-!> Axis-parallel boxes as solids in the grid, by exact intervals: a solid geometry that needs no
-!! bodies.
+!> Axis-parallel boxes as solids in the grid, by exact intervals, without bodies.
 module box_solid_m
   use kinds_m, only: wp
   use boundary_kinds_m, only: side_slip, side_open, side_periodic
-  use grid_m, only: grid_t, unit_step
+  use grid_m, only: grid_t
   use parallel_m, only: decompose
   use solid_geometry_m, only: solid_geometry_t
   implicit none

@@ -4,8 +4,9 @@
 !! system.
 module linear_systems_m
   use kinds_m, only: wp, pi
-  use case_types_m, only: grid_input_t, boundary_input_t
-  use grid_m, only: grid_t, grid_init, unit_step
+  use errors_m, only: to_text
+  use case_text_m, only: grid_of, sides
+  use grid_m, only: grid_t, unit_step
   use linear_operator_m, only: linear_operator_t
   use krylov_m, only: krylov_work_t, krylov_init
   use multigrid_m, only: multigrid_t
@@ -48,18 +49,14 @@ contains
     character(*), intent(in) :: top     !! 'open' or a wall
     logical, intent(in) :: periodic(3)
     type(grid_t), intent(out) :: grid
-    type(grid_input_t) :: input
-    type(boundary_input_t) :: boundary
-    integer :: d
+    character(8) :: kind(2, 3)
 
-    input%cells = n
-    input%length = length
-    boundary%kind = 'slip'
-    boundary%kind(2, 3) = top
-    do d = 1, 3
-      if (periodic(d)) boundary%kind(:, d) = 'periodic'
-    end do
-    call grid_init(input, boundary, grid)
+    kind = 'slip'
+    kind(2, 3) = top
+    where (spread(periodic, 1, 2)) kind = 'periodic'
+    call grid_of('&grid cells='//to_text(n)//' length='//to_text(length)//'/ ' &
+      //sides(kind(1, 1)//' '//kind(2, 1)//' '//kind(1, 2)//' '//kind(2, 2)//' '//kind(1, 3)//' ' &
+      //kind(2, 3)), grid)
   end subroutine make_grid
 
   !> Coefficients w A/(rho h) of water and air (830 to 1) under waves, with blocks of seven cubes.

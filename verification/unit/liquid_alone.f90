@@ -9,7 +9,7 @@ module liquid_alone_m
                                 small_cells, finish_transport
   implicit none
   private
-  public :: transport_liquid, balance_solver
+  public :: transport_liquid
 
 contains
 
@@ -24,7 +24,7 @@ contains
     type(elliptic_solver_t) :: solver
     integer :: n, subcycle
 
-    solver = balance_solver(grid)
+    call elliptic_solver_init(grid, solver)
     call begin_transport(grid, old, new, dt, solver, self, flow)
     do subcycle = 1, self%subcycles
       call begin_subcycle(grid, old, subcycle, step, self)
@@ -35,13 +35,5 @@ contains
     end do
     call finish_transport(grid, new, self, flow)
   end subroutine transport_liquid
-
-  !> A solver for the volume balances of a grid.
-  function balance_solver(grid) result(solver)
-    type(grid_t), intent(in) :: grid
-    type(elliptic_solver_t) :: solver
-
-    call elliptic_solver_init(grid, solver)
-  end function balance_solver
 
 end module liquid_alone_m

@@ -99,8 +99,7 @@ contains
     s%torque_b = 4*s%xi
   end subroutine fill_displacements
 
-  !> Fill an array, halo included, with numbers that tell the cell of the domain: those of periodic
-  !! images are equal.
+  !> Fill an array, halo included, with numbers that tell the cell; periodic images are equal.
   subroutine fill_cells(start, grid, m, a)
     real(wp), intent(in) :: start
     type(grid_t), intent(in) :: grid

@@ -59,8 +59,7 @@ contains
     integer :: i, different
 
     s = exact_sum(a)
-    call check('as in quadruple precision', s, real(sum(real(a, real128)), wp), &
-      1.0e-15_wp*sum(abs(a)))
+    call check('in quadruple precision', s, real(sum(real(a, real128)), wp), 1.0e-15_wp*sum(abs(a)))
     different = 0
     do i = 1, 40
       call set_threads(1 + modulo(i, 3))

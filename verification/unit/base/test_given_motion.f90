@@ -1,5 +1,4 @@
-!> Bodies moved by a table: through its rows, at rest outside, smooth, and with rates that are those
-!! of the pose.
+!> Bodies moved by a table: through its rows, at rest outside, smooth, rates those of the pose.
 module test_given_motion_m
   use check_m, only: check, wp
   use vectors_m, only: quaternion_from_axis, quaternion_product, quaternion_log, quaternion_exp

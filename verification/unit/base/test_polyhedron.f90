@@ -50,10 +50,9 @@ contains
   !> Three ways to the same numbers, and the two sides of a plane add up.
   subroutine tet_below_plane()
     type(polyhedron_t) :: p
-    real(wp) :: c(3, 4), n(3), d, v1, m1(3), v2, m2(3), v3, m3(3), worst(3)
+    real(wp) :: c(3, 4), n(3), d, v1, m1(3), v2, m2(3), v3, m3(3)
     integer :: t
 
-    worst = 0.0_wp
     do t = 1, 1000
       c = draw_points(4)
       n = 2.0_wp*reshape(draw_points(1), [3]) - 1.0_wp
@@ -62,12 +61,10 @@ contains
       call polyhedron_of_tet(c, p)
       call polyhedron_moments_below(p, n, d, v2, m2)
       call tet_moments_below(c, -n, -d, v3, m3)
-      worst(1) = max(worst(1), abs(v1 - v2), maxval(abs(m1 - m2)))
-      worst(2) = max(worst(2), abs(v1 + v3 - abs(tet_volume(c))))
-      worst(3) = max(worst(3), maxval(abs(m1 + m3 - abs(tet_volume(c))*sum(c, 2)/4.0_wp)))
+      call check('corner graph against closed form', [v1, m1], [v2, m2], 1e-15_wp)
+      call check('both sides of a plane add up', [v1 + v3, m1 + m3], &
+        abs(tet_volume(c))*[1.0_wp, sum(c, 2)/4.0_wp], 1e-15_wp)
     end do
-    call check('corner graph against closed form', worst(1), 0.0_wp, 1e-15_wp)
-    call check('both sides of a plane add up', worst(2:3), [0.0_wp, 0.0_wp], 1e-15_wp)
   end subroutine tet_below_plane
 
   !> Unit corner tetrahedron and unit box cut exactly through corners, edges and faces.
@@ -75,7 +72,6 @@ contains
     type(polyhedron_t) :: p
     real(wp) :: c(3, 4), n(3), volume, moment(3), lower, upper
     integer :: a, d
-    logical :: good
 
     c = 0.0_wp
     c(1, 2) = 1.0_wp
@@ -86,7 +82,6 @@ contains
       volume_of_part(c, [0.0_wp, 0.0_wp, -1.0_wp], 0.0_wp), 1.0_wp/6.0_wp)
     call check('half by a plane through an edge', &
                volume_of_part(c, [1.0_wp, -1.0_wp, 0.0_wp], 0.0_wp), 1.0_wp/12.0_wp, 1e-17_wp)
-    good = .true.
     do a = 0, 26
       n = modulo(a/[1, 3, 9], 3) - 1.0_wp
       if (a == 13) cycle   ! no direction
@@ -94,10 +89,10 @@ contains
         call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
         call polyhedron_moments_below(p, n, real(d, wp), lower, moment)
         call polyhedron_moments_below(p, -n, -real(d, wp), upper, moment)
-        good = good .and. abs(lower + upper - 1.0_wp) < 1e-15_wp .and. lower >= 0.0_wp
+        call check('box cut through its corners', lower + upper, 1.0_wp, 1e-15_wp)
+        call check('no less than nothing', lower >= 0.0_wp)
       end do
     end do
-    call check('box cut through its corners in all 26 directions', good)
     call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
     do d = 1, 3
       n = 0.0_wp
@@ -132,10 +127,9 @@ contains
   !> The parts of a tetrahedron in the cells of a box add up to it, also below a plane.
   subroutine cells_fill_the_tet()
     integer, parameter :: m = 4
-    real(wp) :: c(3, 4), lo(3), v, mom(3), total, moment(3), whole, whole_moment(3), n(3), worst(2)
+    real(wp) :: c(3, 4), lo(3), v, mom(3), total, moment(3), whole, whole_moment(3), n(3)
     integer :: t, i
 
-    worst = 0.0_wp
     do t = 1, 20
       c = draw_points(4)
       if (t <= 10) c = anint(c*real(m, wp))/real(m, wp)   ! corners on the planes of the cells
@@ -149,10 +143,9 @@ contains
         total = total + v
         moment = moment + mom
       end do
-      worst(1) = max(worst(1), abs(total - whole))
-      worst(2) = max(worst(2), maxval(abs(moment - whole_moment)))
+      call check('cells fill the tetrahedron below a plane', [total, moment], &
+        [whole, whole_moment], 1e-15_wp)
     end do
-    call check('cells fill the tetrahedron below a plane', worst, [0.0_wp, 0.0_wp], 1e-15_wp)
   end subroutine cells_fill_the_tet
 
 end module test_polyhedron_m

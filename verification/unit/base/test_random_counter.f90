@@ -46,8 +46,7 @@ contains
     call check(name//': mean', sum(x)/n, 0.5_wp, 4*sigma)
     call check(name//': variance', sum((x - 0.5_wp)**2)/n, 1/12.0_wp, 4*sqrt(1/(180.0_wp*n)))
     call check(name//': chi-square', chi, classes - 1.0_wp, 4*sqrt(2.0_wp*classes))
-    call check(name//': correlation', 12*sum((x - 0.5_wp)*(y - 0.5_wp))/n, 0.0_wp, &
-      4/sqrt(real(n, wp)))
+    call check(name//': related', 12*sum((x - 0.5_wp)*(y - 0.5_wp))/n, 0.0_wp, 4/sqrt(real(n, wp)))
   end subroutine test_uniform
 
   !> A turned axis points evenly in all directions; the quaternions have unit length.

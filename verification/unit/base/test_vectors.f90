@@ -26,8 +26,7 @@ contains
     call check('y cross z is x', cross(ey, ez), ex)
     call check('z cross x is y', cross(ez, ex), ey)
     call check('length', norm([2.0_wp, 3.0_wp, 6.0_wp]), 7.0_wp, round_off)
-    call check('unit length', norm(normalised([1.0_wp, -2.0_wp, 5.0_wp, 9.0_wp])), 1.0_wp, &
-      round_off)
+    call check('a unit', norm(normalised([1.0_wp, -2.0_wp, 5.0_wp, 9.0_wp])), 1.0_wp, round_off)
     call check('zero stays zero', normalised([0.0_wp, 0.0_wp]), [0.0_wp, 0.0_wp])
   end subroutine test_products
 
@@ -72,8 +71,7 @@ contains
       call check('small part keeps its digits', q(2:4)*10.0_wp**i, &
         10.0_wp**i*sin(0.5_wp*norm(w))*normalised(w), round_off)
     end do
-    call check('no turn', &
-      quaternion_exp([0.0_wp, 0.0_wp, 0.0_wp]), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+    call check('none', quaternion_exp([0.0_wp, 0.0_wp, 0.0_wp]), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
   end subroutine test_small_angles
 
 end module test_vectors_m

@@ -1,5 +1,4 @@
-!> What touches now and what will soon: which of the two a gap makes it, for both contact models,
-!! and how stiff both are together.
+!> What touches now or soon, as a gap tells, for both contact models, and how stiff both are.
 module test_contact_detection_m
   use check_m, only: check, wp, pi
   use counterparts_m, only: update_counterparts
@@ -53,8 +52,7 @@ contains
       blocks%v(3, 1) = fast
       call detect_contacts(walls, blocks, ahead, detected)
       call check(model//': one more soon', all([detected%points%n, detected%soon%n] == [1, 1]))
-      call check(model//': the ball between swings with both', detected%response%frequency2(1), &
-        2*once, 1.0e-4_wp*once)
+      call check(model//': with both', detected%response%frequency2(1), 2*once, 1.0e-4_wp*once)
     end associate
   end subroutine check_frequency
 

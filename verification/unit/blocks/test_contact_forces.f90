@@ -135,8 +135,7 @@ contains
       energy(i) = elastic_energy(detected, displacements, rest)
       if (i == 0) call check('force k d^1.5', loads%force(3, 1), k_n*d**1.5_wp, 1.0e-12_wp*k_n)
     end do
-    call check('its slope', (energy(1) - energy(-1))/(2*step), k_n*d**1.5_wp, &
-      1.0e-6_wp*k_n*d**1.5_wp)
+    call check('slope', (energy(1) - energy(-1))/(2*step), k_n*d**1.5_wp, 1.0e-6_wp*k_n*d**1.5_wp)
     do i = -1, 1
       displacements%xi(:, 1) = (stretch + i*step)*x
       call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
@@ -153,8 +152,7 @@ contains
       rest), energy(1) + 3.0_wp, 1.0e-14_wp)
   end subroutine check_energy
 
-  !> Friction holds up to its share of the normal force; what slips pulls with just that, and its
-  !! displacement is no larger.
+  !> Friction holds up to its share of the normal force; what slips pulls with just that.
   subroutine check_friction()
     real(wp), parameter :: d = 0.01_wp, push = k_n*d
     type(displacements_t) :: displacements
@@ -171,8 +169,7 @@ contains
     call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
     call check('slips', loads%force([1, 3], 3), push*[mu, 1.0_wp], 1.0e-12_wp*push)
     call check('slips on the floor', loads%force(1, 2), wall_mu*push, 1.0e-12_wp*push)
-    call check('what is kept', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], &
-      1.0e-12_wp*push/k_t)
+    call check('stretch', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], 1.0e-12_wp*push/k_t)
   end subroutine check_friction
 
   !> The force belongs to the velocity in the middle of the substep, which it changes itself; the

@@ -61,8 +61,7 @@ contains
       call check('force is the slope of energy', (beside(2)%energy - beside(1)%energy)/(2*step), &
         elastic%force, 1.0e-6_wp*elastic%force)
       slope = 3.0_wp*weight*elastic%hardness*elastic%steepness
-      call check('stiffness is the slope of force', (beside(2)%force - beside(1)%force)/(2*step), &
-        slope, 1.0e-6_wp*slope)
+      call check('stiffness', (beside(2)%force - beside(1)%force)/(2*step), slope, 1.0e-6_wp*slope)
     end do
     call law%normal_stiffness(3.0_wp, weight, 0.1_wp*hard, hard, elastic)
     call check('linear where shallow', elastic%force, 0.3_wp*weight*hard, 2.0e-4_wp*elastic%force)
@@ -147,8 +146,7 @@ contains
     call check('given eta_t', law%tangential_damping(0.5_wp, 9.0_wp, 9.0_wp, 9.0_wp), 2.5_wp)
   end subroutine check_constants
 
-  !> Beyond critical damping the spring stays and the dashpot grows, to that of the least
-  !! restitution.
+  !> Beyond critical damping the spring stays; the dashpot grows to that of the least restitution.
   subroutine check_overdamped()
     real(wp), parameter :: e(5) = [0.0_wp, 1.0e-6_wp, 1.0e-3_wp, 0.05_wp, 0.1_wp], &
       time = 1.0e-3_wp, mass = 0.25_wp
@@ -171,8 +169,7 @@ contains
       time, 1.0e-15_wp)
   end subroutine check_overdamped
 
-  !> A contact point carries a load within what it may give way, but is no stiffer than that of two
-  !! blocks of that mass.
+  !> A contact point yields under a load as allowed, but is no stiffer than that of two such blocks.
   subroutine check_load()
     real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, g = 9.81_wp, time = 1.0e-2_wp
     type(contact_input_t) :: input

@@ -43,8 +43,7 @@ contains
       1.0e-12_wp)
   end subroutine check_depth
 
-  !> What the counterparts of a case carry: the heaviest body that moves freely; and each may give
-  !! way by a hundredth of its edge.
+  !> Load: the heaviest body that moves freely; each may give way by a hundredth of its edge.
   subroutine check_heaviest()
     type(world_t) :: world
     type(counterparts_t) :: counterparts
@@ -54,8 +53,7 @@ contains
       //'kind="cube" size=.02/ &shape name="large" kind="cube" size=.3/ &body shape="small" ' &
       //'position=3*.5/ &body shape="large" position=3*1/ &body shape="small" position=3*1.5/', &
         world)
-    call check('a twelfth of the edge of a cube', hard_depth(world%shapes(1)), size(1)/12, &
-      1.0e-15_wp)
+    call check('a twelfth of the edge', hard_depth(world%shapes(1)), size(1)/12, 1.0e-15_wp)
     call counterparts_init(world%blocks, counterparts)
     call update_counterparts(world%walls, [0.0_wp, 0.0_wp, -g], world%blocks, counterparts)
     load = load_of(world%blocks%mass(2), g)

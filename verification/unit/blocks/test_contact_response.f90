@@ -1,12 +1,11 @@
-!> How contact points respond: damping of a pair, forces that follow from an energy, highest
-!! frequencies.
+!> Response of contact points: damping of a pair, forces of an energy, highest frequencies.
 module test_contact_response_m
   use check_m, only: check, wp
   use case_types_m, only: contact_input_t
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
-  use counterparts_m, only: counterparts_t, motion_t, wrench_t, act
+  use counterparts_m, only: counterparts_t, motion_t, wrench_t
   use contact_response_m, only: response_t, respond, highest_frequency2, bound_by_sums, &
     opening_speed, push_apart, impact_turn
   use two_cubes_m, only: vector, free_bodies
@@ -93,8 +92,7 @@ contains
                sqrt(weight)/lever, 1.0e-6_wp*sqrt(weight)/lever)
   end subroutine check_beginning
 
-  !> A pair swings with sqrt(k/m*); a ball between two swings with both pairs, which only has to be
-  !! stable.
+  !> A pair swings with sqrt(k/m*); a ball between two with both pairs, which has to be stable only.
   subroutine check_frequencies()
     type(contact_points_t) :: points
     type(response_t) :: response

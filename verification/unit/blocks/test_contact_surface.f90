@@ -1,10 +1,8 @@
-!> Contact points of exact surfaces: where they are, how deep, and forces that follow from an
-!! energy.
+!> Contact points of exact surfaces: where they are, how deep, forces that follow from an energy.
 module test_contact_surface_m
   use check_m, only: check, wp, pi
   use vectors_m, only: cross, quaternion_from_axis, quaternion_exp, quaternion_product, normalised
   use random_counter_m, only: uniform, random_rotation
-  use rigid_body_m, only: release_body
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use world_m, only: world_t, set_up, body
@@ -57,8 +55,7 @@ contains
     call find_surface_points(world%walls, world%blocks, 0.0_wp, world%surface, world%points)
   end subroutine find
 
-  !> A hexapod on one, two and three legs: the heights 1.5 d, sqrt(2) d, 2.5 d/sqrt(3) and the
-  !! corners that stand.
+  !> A hexapod on one, two, three legs: heights 1.5 d, sqrt(2) d, 2.5 d/sqrt(3), standing corners.
   subroutine check_rest_heights()
     type(touching_t) :: world
     real(wp), parameter :: sunk = 1.0e-5_wp, &
@@ -151,8 +148,7 @@ contains
         end associate
       end do
       call check('a face carries', force > 0.9_wp*depth)
-      if (cross_laid == 0) call check('no tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
-                                      1.0e-9_wp*d*force)
+      if (cross_laid == 0) call check('tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-9_wp*d*force)
     end do
   end subroutine check_faces_on_one_another
 
@@ -173,8 +169,7 @@ contains
       world%surface%search%margin = 1.0e-4_wp
       call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
       call check('comes', (world%points%n > 0) .eqv. (m == 1 .or. m == 4))
-      if (m == 4) call check('its side', &
-        minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
+      if (m == 4) call check('side', minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
       world%surface%search%margin = 0.0_wp
       call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
       call check('near enough', world%points%n > 0)

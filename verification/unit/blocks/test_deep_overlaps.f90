@@ -43,8 +43,7 @@ contains
     call add_point(contact_point_t(3, 2, 1, depth=0.0039_wp), points)
     call add_point(contact_point_t(3, 2, 2, depth=0.0041_wp), points)
     call store_points(points, deep)
-    call check('those before are forgotten', deep%share(:3), [0.0_wp, 0.205_wp, &
-      0.205_wp], 1.0e-12_wp)
+    call check('those before forgotten', deep%share(:3), [0.0_wp, 0.205_wp, 0.205_wp], 1.0e-12_wp)
     call check('a fault from a fifth on', index(overlap_fault(deep), &
       'body 2 and body 3 reach 0.0041 m into one another, 20.5 % of the size of the smaller') == 1)
     call check_asked()

@@ -1,5 +1,4 @@
-!> Lists of contact points and displacements: order, parting, joining, and the groups that share
-!! one.
+!> Lists of contact points and displacements: order, parting, joining, groups that share one.
 module test_displacements_m
   use check_m, only: check, wp
   use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, set_apart, &
@@ -28,8 +27,7 @@ contains
     call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
   end subroutine check_order
 
-  !> A list of displacements of bodies with counterpart 1; all else follows from its
-  !! body.
+  !> A list of displacements of bodies with counterpart 1; all else follows from its body.
   subroutine make(bodies, displacements)
     integer, intent(in) :: bodies(:)
     type(displacements_t), intent(inout) :: displacements
@@ -51,24 +49,26 @@ contains
   end subroutine make
 
   !> Whether a list is that of some bodies.
-  logical function is(displacements, bodies) result(yes)
+  logical function is(displacements, bodies)
     type(displacements_t), intent(in) :: displacements
     integer, intent(in) :: bodies(:)
     type(displacements_t) :: wanted
-    integer :: n
 
     call make(bodies, wanted)
-    n = displacements%n
-    yes = n == wanted%n
-    if (.not. yes) return
-    yes = all(displacements%a(:n) == bodies) .and. all(displacements%b(:n) == 1) &
-      .and. all(displacements%id(:n) == wanted%id(:n)) .and. all(abs(displacements%xi(:, :n) &
-      - wanted%xi(:, :n)) <= 0.0_wp) .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
-      .and. all(abs(displacements%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
-      .and. all(abs(displacements%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
-      .and. all(abs(displacements%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
-      .and. all(abs(displacements%energy(:n) - wanted%energy(:n)) <= 0.0_wp)
+    is = displacements%n == wanted%n
+    if (is) is = all(abs(content(displacements) - content(wanted)) <= 0.0_wp)
   end function is
+
+  !> All numbers of a list.
+  pure function content(list) result(x)
+    type(displacements_t), intent(in) :: list
+    real(wp), allocatable :: x(:)
+
+    associate (n => list%n)
+      x = [real([list%a(:n), list%b(:n), list%id(:n)], wp), list%k(:n), list%energy(:n), &
+        list%xi(:, :n), list%force(:, :n), list%torque_a(:, :n), list%torque_b(:, :n)]
+    end associate
+  end function content
 
   !> Chosen displacements go to the other list, whole and in order.
   subroutine check_moving()

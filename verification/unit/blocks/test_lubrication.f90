@@ -181,8 +181,7 @@ contains
     call lubricate(world%walls, world%blocks, dt, 0.0_wp, world%contacts%lubrication, force)
     call check('some pairs have a film, most have none', active > n/2 .and. active < n*(n - 1)/4)
     do i = 1, n
-      call check('force in the swarm', force(:, i), expected(:, i), &
-                 1.0e-12_wp*maxval(abs(expected)))
+      call check('of the swarm', force(:, i), expected(:, i), 1.0e-12_wp*maxval(abs(expected)))
     end do
   end subroutine check_swarm
 

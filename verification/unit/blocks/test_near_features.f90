@@ -67,8 +67,7 @@ contains
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], 1.0_wp + apart, no_turn, &
       no_turn)), cube, cube, search, near)
     call check('one corner of each', all([near%of_a%n, near%of_b%n] == 1))
-    call check('how far away', [near%of_a%away(1), near%of_b%away(1)], &
-      [0.07_wp, 0.07_wp], 1.0e-14_wp)
+    call check('how far', [near%of_a%away(1), near%of_b%away(1)], [0.07_wp, 0.07_wp], 1.0e-14_wp)
     call check('the corner of b', cube%vertex(:, near%of_b%vertex(1)), -[0.5_wp, 0.5_wp, 0.5_wp])
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.4_wp, 0.3_wp, 1.05_wp], &
       no_turn, no_turn)), ball, cube, search, near)

@@ -125,8 +125,7 @@ contains
     call check('one period', walls%period, [0.0_wp, 0.1_wp, 0.0_wp])
   end subroutine check_walls
 
-  !> Largest overlap of a run: the largest of all pairs asked one by one; and the room for a new
-  !! body.
+  !> Largest overlap of a run: that of all pairs asked one by one; and room for a new body.
   subroutine check_run()
     integer, parameter :: n = 12
     type(world_t) :: world

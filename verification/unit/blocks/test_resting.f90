@@ -1,5 +1,4 @@
-!> Who falls asleep and who wakes at the start of a step, and where the displacements of its contact
-!! points go.
+!> Who falls asleep or wakes at the start of a step, and where its displacements go.
 module test_resting_m
   use check_m, only: check, wp
   use errors_m, only: to_text
@@ -26,8 +25,7 @@ contains
     call check_held()
   end subroutine test_resting
 
-  !> A ball on the floor, or on another one that is held, whose spring carries a part of its weight;
-  !! it has been slow for long.
+  !> A ball, slow for long, on the floor or a held ball; its spring carries a part of its weight.
   subroutine begin(part, support, speed, world)
     real(wp), intent(in) :: part         !! 1: in balance [-]
     integer, intent(in) :: support       !! 0: the floor, 1: a ball that is held
@@ -60,8 +58,7 @@ contains
     call wake_or_sleep(world%walls, gravity, dt, world%contacts, world%blocks)
   end subroutine start_step
 
-  !> It sleeps where the forces balance within 0.2 % of the load, the fluid included. It
-  !! wakes where they leave more than 2 %.
+  !> It sleeps where forces balance within 0.2 % of the load, fluid included, and wakes above 2 %.
   subroutine check_balance()
     real(wp), parameter :: off(4) = [-0.0021_wp, -0.0019_wp, 0.0019_wp, 0.0021_wp]
     type(world_t) :: world

@@ -148,8 +148,7 @@ contains
     call check('rate unchanged', blocks%omega(:, 1) - omega, 0.0_wp)
   end subroutine check_prescribed
 
-  !> After the fluid: M dU/dt = fluid + contact + M g and dL/dt = fluid + contact, from the start of
-  !! the step.
+  !> M dU/dt = fluid + contact + M g and dL/dt = fluid + contact, from the start of the step.
   subroutine check_after_fluid()
     real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp], dt = 0.01_wp
     real(wp) :: force(3, 1), torque(3, 1), v(3), l(3)

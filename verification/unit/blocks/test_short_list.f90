@@ -15,6 +15,9 @@ module test_short_list_m
   real(wp), parameter :: deep = 0.125_wp   !! no contact is deeper: half the length d_s [m]
   type(surface_t) :: cube
   type(search_t) :: search
+  type(near_features_t) :: near
+  type(short_list_t) :: short
+  type(meeting_t) :: now
 
 contains
 
@@ -26,18 +29,18 @@ contains
     call check_nothing_missing()
   end subroutine test_short_list
 
+  logical function holds()
+    holds = short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short)
+  end function holds
+
   !> A short list holds until the way since then and the gap that counts as a contact point are as
   !! told; no longer than the lists it was chosen from, and as long as these where they are empty.
   subroutine check_how_long()
     real(wp), parameter :: none(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
-    type(near_features_t) :: near
-    type(short_list_t) :: short
-    type(meeting_t) :: now
     real(wp) :: left
 
     now = meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 1.001_wp], none, none))
-    call check('none yet', .not. short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
-      short))
+    call check('none yet', .not. holds())
     now%gap = gap
     call list_features(now, cube, cube, search, near)
     call choose_features(now, 0.0_wp, search, cube, cube, near, short)
@@ -45,34 +48,27 @@ contains
     call check('features', n_chosen(short), 16 + short%n_edges)
     left = short%until - gap
     now%poses%x_b(1) = 0.999_wp*left
-    call check('holds', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
+    call check('holds', holds())
     now%poses%x_b(1) = 1.001_wp*left
-    call check('moved too far', .not. short_list_holds(now, cube%bounding_radius, &
-      cube%bounding_radius, short))
+    call check('moved too far', .not. holds())
     now%gap = 0.9_wp*gap
-    call check('less counts', short_list_holds(now, cube%bounding_radius, &
-      cube%bounding_radius, short))
+    call check('less counts', holds())
     now%poses = short%when
     call choose_features(now, near%valid - 0.5_wp*gap, search, cube, cube, near, short)
     now%poses%x_b(1) = 0.49_wp*gap
-    call check('held', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
+    call check('held', holds())
     now%poses%x_b(1) = 0.51_wp*gap
-    call check('no longer than the lists', &
-      .not. short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
+    call check('no longer than the lists', .not. holds())
     now = meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 3.0_wp], none, none))
     call list_features(now, cube, cube, search, near)
     call choose_features(now, 0.0_wp, search, cube, cube, near, short)
     now%poses%x_b(3) = 3.0_wp - 0.999_wp*near%valid
-    call check('empty lists', short_list_holds(now, cube%bounding_radius, &
-      cube%bounding_radius, short))
+    call check('empty lists', holds())
   end subroutine check_how_long
 
   !> As long as it holds, a short list made some time after the lists has every vertex that touches
   !! or soon will, with what it touches, and every pair of edges that cross.
   subroutine check_nothing_missing()
-    type(near_features_t) :: near
-    type(short_list_t) :: short
-    type(meeting_t) :: now
     real(wp) :: way
     integer :: i, n
 
@@ -86,7 +82,7 @@ contains
       call choose_features(now, way, search, cube, cube, near, short)
       now = meeting_at(moved(i, min(short%until - gap, short%left), now%poses))
       now%gap = gap
-      call check('holds', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
+      call check('holds', holds())
       call check_vertices(now%b_in_a, short%item(:short%of_a - 1), n)
       call check_vertices(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
       call check_crossings(now%a_in_b, short%item(short%edges:short%n), n)

@@ -98,8 +98,7 @@ contains
     end do
   end function worst_cell
 
-  !> A box of 4 x 3 x 3 cells: full cells, closed faces all round, two hits on each link through it;
-  !! counting gives the same.
+  !> A box of 4 x 3 x 3 cells: full cells, closed faces, two hits on each link; counted likewise.
   subroutine box_on_the_grid()
     type(subcell_work_t) :: work
     real(wp) :: beta

@@ -124,8 +124,7 @@ contains
       call force_from_faces(block%grid, block%bodies, flux, block%flow%p, by_faces)
       defect = mass_defect(block%grid, fluid, solid, block%bodies, flux, block%flow)
       force(:, 1) = -matmul(defect(:, :, 1), fluid%gravity)
-      call check('by faces: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
-                 1.0e-10_wp*weight)
+      call check('by faces', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), 1.0e-10_wp*weight)
       call check('faces and correction: torque', by_faces(4:6, 1) + force(4:6, 1), expected(4:6), &
                  1.0e-10_wp*weight*0.03_wp)
       call check('the correction is not nothing', norm2(force(1:3, 1)) > 1.0e-5_wp*weight)

@@ -23,7 +23,7 @@ contains
     call density_of_mixture(block%grid, block%solid, block%bodies, block%flow%rho, mixture)
     solid = block%bodies%mass(1)
     call check('fluid and a free body', mass(), fluid + solid, 1.0e-12_wp*fluid)
-    call check('no less than the fluid anywhere', &
+    call check('no lighter', &
                minval(mixture) >= block%case%fluid%liquid_density*(1.0_wp - 1.0e-15_wp))
     block%bodies%free = .false.
     call density_of_mixture(block%grid, block%solid, block%bodies, block%flow%rho, mixture)

@@ -1,5 +1,4 @@
-!> What the flow knows of the blocks: inertia turned into space, who is moved, and how far a force
-!! moves them.
+!> Blocks in the flow: inertia turned into space, who is moved, and how far by a force.
 module test_push_bodies_m
   use check_m, only: check, wp, pi
   use errors_m, only: to_text
@@ -27,8 +26,7 @@ contains
     call check_push()
   end subroutine test_push_bodies
 
-  !> Boxes: one turned by an eighth about z, one held, one asleep, one not there yet, one by a
-  !! quarter about x.
+  !> Boxes: turned by an eighth about z, held, asleep, not there yet, turned by a quarter about x.
   subroutine make_blocks()
     type(world_t) :: world
 

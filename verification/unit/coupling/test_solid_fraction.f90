@@ -1,5 +1,4 @@
-!> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, links, pockets,
-!! periods.
+!> Bodies in the grid: volumes, shares by cut tetrahedra, degenerate poses, links, pockets, periods.
 module test_solid_fraction_m
   use check_m, only: check, wp, pi
   use case_types_m, only: shape_input_t
@@ -263,33 +262,26 @@ contains
   !> All axis-parallel poses on the grid: whole cells, whole faces, nothing cut, everything closed.
   subroutine faces_on_grid_planes()
     integer :: p, e, a(3), b(3)
-    logical :: whole, fits, counted, beta
 
     call tank([20, 20, 40], [0.1_wp, 0.1_wp, 0.2_wp])
-    whole = .true.
-    fits = .true.
-    counted = .true.
-    beta = .true.
     do p = 0, 15
       call put('hexapod', [d], [0.05_wp, 0.05_wp, 0.16_wp], quarter_turns(p))
       call fill()
-      whole = whole .and. solid%n_cut == 0 .and. abs(sum(solid%alpha) - 7*64) <= 0.0_wp
-      counted = counted .and. solid%body_cell(2) - 1 == 448 .and. count(solid%inside == 1) == 448
+      call check('on grid planes: cells are full or empty', sum(solid%alpha), 7*64.0_wp)
+      call check('on grid planes: none is cut', solid%n_cut, 0)
+      call check('on grid planes: all with the centre inside', &
+        all([solid%body_cell(2) - 1, count(solid%inside == 1)] == 448))
       ! Along each direction one bar of 12 and four of 4 cells, 4 x 4 wide.
-      beta = beta .and. solid%body_face(2) - 1 == 3*(16*13 + 4*16*5) .and. &
-        all(abs(solid%face_beta(:solid%body_face(2) - 1) - 1) <= 0.0_wp)
+      call check('on grid planes: faces', solid%body_face(2) - 1, 3*(16*13 + 4*16*5))
+      call check('on grid planes: by the body', solid%face_beta(:solid%body_face(2) - 1), 1.0_wp)
       do e = 1, 3
         a = 1 - unit_step(:, e)
         b = grid%n - unit_step(:, e)
-        fits = fits .and. all((solid%aperture(1:20, 1:20, 1:40, e) > 0.0_wp) .neqv. &
-          max(solid%alpha(1:20, 1:20, 1:40), solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3))) > 0.5_wp)
+        call check('on grid planes: all faces of full cells are closed, no other', &
+          solid%aperture(1:20, 1:20, 1:40, e) - merge(0.0_wp, 1.0_wp, max(solid%alpha(1:20, &
+          1:20, 1:40), solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3))) > 0.5_wp), 0.0_wp)
       end do
-      fits = fits .and. all(solid%aperture <= 0.0_wp .or. solid%aperture >= 1.0_wp)
     end do
-    call check('on grid planes: cells are full or empty', whole)
-    call check('on grid planes: 448 cells, all with the centre inside', counted)
-    call check('on grid planes: all faces of full cells are closed, no other', fits)
-    call check('on grid planes: each of them by the body', beta)
   end subroutine faces_on_grid_planes
 
   !> A cube with its sides on planes of the grid or of centres, a little to the left or right of
@@ -297,27 +289,25 @@ contains
   subroutine both_sides_alike()
     real(wp), parameter :: edges(2) = [0.04_wp, 0.035_wp]   !! in cells of 5 mm
     real(wp), parameter :: little(3) = [0.0_wp, 3.0e-6_wp, -3.0e-6_wp]   !! [cells]
-    logical :: alike(3)
     integer :: e, m, i
 
     call tank([20, 20, 20], [0.1_wp, 0.1_wp, 0.1_wp])
-    alike = .true.
     do e = 1, 2
       do m = 1, 3
         call put('cube', edges(e:e), [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp])
         call fill()
         do i = 1, 20
           associate (w => solid%aperture, n => solid%link_number)
-            alike = alike .and. [all(solid%inside(i, 1:20, 1:20) == solid%inside(21 - &
-              i, 1:20, 1:20)), all(abs(w(i, 1:20, 1:20, 1) - w(22 - i, 1:20, 1:20, 1)) <= 0.0_wp), &
-              all((n(i, 1:20, 1:20, 1) > 0) .eqv. (n(22 - i, 1:20, 1:20, 1) > 0))]
+            call check('both sides alike: centres inside', &
+              all(solid%inside(i, 1:20, 1:20) == solid%inside(21 - i, 1:20, 1:20)))
+            call check('both sides alike: open faces', &
+              w(i, 1:20, 1:20, 1) - w(22 - i, 1:20, 1:20, 1), 0.0_wp)
+            call check('both sides alike: links', &
+              all((n(i, 1:20, 1:20, 1) > 0) .eqv. (n(22 - i, 1:20, 1:20, 1) > 0)))
           end associate
         end do
       end do
     end do
-    call check('both sides alike: centres inside', alike(1))
-    call check('both sides alike: open faces', alike(2))
-    call check('both sides alike: links', alike(3))
   end subroutine both_sides_alike
 
   !> Corners, edges and sides on grid planes and cell centres, or nearly: volume, open and solid
@@ -327,14 +317,10 @@ contains
       pi/6, atan(sqrt(0.5_wp))]
     real(wp), parameter :: shift(8) = [0.0_wp, 0.5_wp, 0.25_wp, 1e-13_wp, -1e-12_wp, 1e-10_wp, &
       1.0_wp/3, -1e-7_wp]
-    real(wp) :: q(4), x(3), worst(2)
-    integer :: p, i, missing
-    logical :: closed
+    real(wp) :: q(4), x(3)
+    integer :: p, i
 
     call tank([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
-    worst = 0.0_wp
-    missing = 0
-    closed = .true.
     do p = 1, 90
       q = identity
       do i = 1, 3
@@ -348,19 +334,17 @@ contains
       case default; call put('sphere', [0.04_wp], x, q)
       end select
       call fill()
-      worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
-      worst(2) = max(worst(2), largest_gap())
-      missing = missing + links_without_hit()
+      ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
+      call check('degenerate: volume', sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume, &
+        1.0_wp, 1e-5_wp)
+      call check('degenerate: open and solid share fill each face', largest_gap(), 0.0_wp, 1e-14_wp)
+      call check('degenerate: links to the inside without a hit', links_without_hit(), 0)
       associate (w => solid%aperture)
-        closed = closed .and. all(solid%alpha(1:16, 1:16, 1:16) < 1 .or. sum(w(1:16, 1:16, 1:16, &
-          :), 4) + w(2:17, 1:16, 1:16, 1) + w(1:16, 2:17, 1:16, 2) + w(1:16, 1:16, 2:17, 3) <= 0)
+        call check('degenerate: full cells are closed', all(solid%alpha(1:16, 1:16, 1:16) < 1 &
+          .or. sum(w(1:16, 1:16, 1:16, :), 4) + w(2:17, 1:16, 1:16, 1) &
+          + w(1:16, 2:17, 1:16, 2) + w(1:16, 1:16, 2:17, 3) <= 0))
       end associate
     end do
-    ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
-    call check('degenerate: volume', worst(1), 0.0_wp, 1e-5_wp)
-    call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
-    call check('degenerate: full cells are closed all round', closed)
-    call check('degenerate: links between inside and outside without a hit', missing, 0)
   end subroutine degenerate_poses
 
   !> Largest |1 - open - sum of the shares of the bodies| of a face.
@@ -444,8 +428,7 @@ contains
     call check('box: places of the first hits', worst, 0.0_wp, 1e-12_wp)
   end subroutine links_of_a_box
 
-  !> First and last place, 0..1 from a to b, where a line meets the surface of a box of half
-  !! edges e; both 2 if it does not.
+  !> First and last place, 0..1 from a to b, of a line on a box of half edges e; 2 if there is none.
   subroutine cross_box(a, b, e, first, last)
     real(wp), intent(in) :: a(3), b(3), e(3)
     real(wp), intent(out) :: first, last
@@ -479,7 +462,7 @@ contains
     call fill()
     call check('half outside: half the volume', sum(solid%alpha)*grid%volume, 1e-6_wp, 1e-18_wp)
     call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp)
-    call check('half outside: solid share of the side', &
+    call check('half outside: the side', &
       sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
     call check('half outside: faces end', maxval(solid%face(3, 1:solid%body_face(2) - 1)), 11)
     call check('half outside: so do cells', maxval(solid%cell(3, 1:solid%body_cell(2) - 1)), 10)
@@ -608,7 +591,6 @@ contains
     type(solid_geometry_t) :: in_turn(2)
     type(solid_fraction_t) :: fraction
     integer :: s, turn, b
-    logical :: same
 
     call tank([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
     call put('hexapod', [0.015_wp], [0.03_wp, 0.04_wp, 0.03_wp, 0.05_wp, 0.04_wp, 0.05_wp, &
@@ -616,7 +598,6 @@ contains
     call solid_fraction_init(grid, blocks, fraction)
     call solid_geometry_init(grid, in_turn(1), 3)
     call solid_geometry_init(grid, in_turn(2), 3)
-    same = .true.
     turn = 1
     do s = 1, 24
       b = 1 + mod(s/8, 3)
@@ -630,9 +611,8 @@ contains
       turn = 3 - turn
       call update_solid(fraction, grid, blocks, in_turn(turn))
       call fill()
-      same = same .and. same_bits(in_turn(turn), solid)
+      call check('one thing at a time: as if filled afresh', same_bits(in_turn(turn), solid))
     end do
-    call check('one thing at a time: as if filled afresh', same)
     call update_solid(fraction, grid, blocks, in_turn(1))
     in_turn(1)%alpha(1, 1, 1) = mark
     call update_solid(fraction, grid, blocks, in_turn(1))

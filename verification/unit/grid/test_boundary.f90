@@ -2,7 +2,7 @@
 module test_boundary_m
   use check_m, only: check, wp
   use case_types_m, only: grid_input_t, boundary_input_t
-  use boundary_kinds_m, only: side_no_slip, side_slip, side_inflow, is_wall, gives_pressure
+  use boundary_kinds_m, only: side_no_slip, side_slip, side_inflow, is_wall
   use grid_m, only: grid_t, grid_init, n_halo
   use boundary_m, only: fill_scalar_halo, fill_velocity_halo, set_side_velocity
   implicit none

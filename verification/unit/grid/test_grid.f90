@@ -52,9 +52,8 @@ contains
                                    grid%outside([2, 2, 0]), grid%outside([2, 2, 6])]))
     call check('none beyond a period', .not. (grid%outside([2, 0, 2]) .or. grid%outside([2, 5, 2])))
     call check('beyond', all(grid%beyond([0, 0, 0], [1, 2, 3]) .eqv. [.true., .false., .true.]))
-    call check('lower side', all(grid%beside([1, 1, 1], 1, [1, 2, 3]) .eqv. &
-                                            [.true., .false., .true.]))
-    call check('upper side', all(grid%beside(cells, 2, [1, 2, 3]) .eqv. [.true., .false., .true.]))
+    call check('lower', all(grid%beside([1, 1, 1], 1, [1, 2, 3]) .eqv. [.true., .false., .true.]))
+    call check('upper', all(grid%beside(cells, 2, [1, 2, 3]) .eqv. [.true., .false., .true.]))
     call check('not beside', .not. any([grid%beside(2, 1, 1), grid%beside(1, 2, 1)]))
     call check('side of the faces in x', all(grid%side_of_face([1, 2, 6, 7], 1) == &
                                              [side_inflow, no_side, no_side, side_outflow]))

@@ -1,7 +1,8 @@
 !> What lies outside an outflow: columns at rest, the level, the part that yields to a wave.
 module test_outflow_m
   use check_m, only: check, wp
-  use case_types_m, only: grid_input_t, boundary_input_t, fluid_t
+  use case_types_m, only: case_t, fluid_t
+  use case_text_m, only: case_of
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use outflow_m, only: outflow_init, start_outflow, update_outflow, outside_distance, &
@@ -29,20 +30,15 @@ contains
   subroutine make(gravity, single_phase)
     real(wp), intent(in) :: gravity(3)
     logical, intent(in) :: single_phase
-    type(grid_input_t) :: input
-    type(boundary_input_t) :: boundary
+    type(case_t) :: case
 
-    input%cells = [4, 3, 5]
-    input%length = [4.0_wp, 6.0_wp, 0.5_wp]
-    input%origin = [0.0_wp, 0.0_wp, 0.05_wp]
-    boundary%kind(2, 1) = 'outflow'
-    call grid_init(input, boundary, grid)
-    call flow_init(grid, flow)
+    case = case_of('&grid cells=4,3,5 length=4,6,.5 origin=0,0,.05/ &boundary x_max="outflow"/ ' &
+      //'&fluid water_level=.3 liquid_density=1000 gas_density=2/')
+    fluid = case%fluid
     fluid%gravity = gravity
-    fluid%liquid_density = rho_l
-    fluid%gas_density = rho_g
     fluid%single_phase = single_phase
-    fluid%water_level = 0.3_wp
+    call grid_init(case%grid, case%boundary, grid)
+    call flow_init(grid, flow)
     flow%c = 0.0_wp
     flow%c(:, :, 1:2) = 1.0_wp
     flow%c(:, :, 3) = 0.5_wp
@@ -99,8 +95,7 @@ contains
     call check('elsewhere', outside_distance(flow%sides(1, 1), [1, 3, 1], 0.5_wp, rho_l), 0.5_wp)
   end subroutine level_and_wave
 
-  !> The mean velocity starts from that of the faces and follows it in 4 L/c, as far as there is
-  !! liquid.
+  !> The mean velocity starts from that of the faces and follows it in 4 L/c where there is liquid.
   subroutine mean_follows()
     real(wp) :: t
 

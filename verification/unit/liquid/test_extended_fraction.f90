@@ -1,5 +1,4 @@
-!> C^ of full cells: one value in a row of level water whatever stands in it; sealed cells keep
-!! their own.
+!> C^ of full cells: one value in a row of level water; sealed cells keep their own.
 module test_extended_fraction_m
   use check_m, only: check, wp
   use case_types_m, only: fluid_t, water_t

@@ -143,8 +143,7 @@ contains
                .and. all(abs(flow%c(:, :, k + 1:)) <= 0.0_wp))
   end subroutine box_appears
 
-  !> A tilted hexapod through the surface: liquid around it by its tetrahedra, then as one that
-  !! appears.
+  !> A tilted hexapod through the surface: liquid around it by its tetrahedra, then as it appears.
   subroutine block_appears()
     type(one_body_t) :: block
     real(wp), parameter :: level = 0.1413_wp
@@ -167,8 +166,7 @@ contains
 
     call still(level)
     call raise_surface(grid, before, block%solid, extension, flow, rest)
-    call check('it appears', liquid_volume(grid, flow%liquid)/flow%liquid_initial, &
-               1.0_wp, 1.0e-14_wp)
+    call check('volume', liquid_volume(grid, flow%liquid)/flow%liquid_initial, 1.0_wp, 1.0e-14_wp)
     call check('hexapod appears: all of it found a place', rest, 0.0_wp)
     call check('hexapod appears: each row has one C^', spread_of_rows(), 0.0_wp, 1.0e-12_wp)
   end subroutine block_appears

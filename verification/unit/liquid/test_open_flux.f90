@@ -48,8 +48,7 @@ contains
     call check('stopped by the floor: told', flux%unmatched, 0.0_wp)
     call check('stopped by the floor: all is the band', all(flux%band%marked(1:8, 1:9, 1:10) == 1))
     call check('stopped by the floor: balance', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
-    call check('on the floor: out at the top', sum(q(1:8, 1:9, 11, 3)), &
-               -0.01_wp*0.25_wp, 1.0e-12_wp)
+    call check('on the floor: out on top', sum(q(1:8, 1:9, 11, 3)), -0.01_wp*0.25_wp, 1.0e-12_wp)
 
     call start(.false.)
     call stand_on_floor()

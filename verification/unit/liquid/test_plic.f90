@@ -1,5 +1,4 @@
-!> The plane in a box cell: constant and volume are inverse, slabs add up, normals of planes are
-!! exact.
+!> The plane in a box cell: constant and volume are inverse, slabs add up, normals are exact.
 module test_plic_m
   use check_m, only: check, wp, pi
   use plic_m, only: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
@@ -34,28 +33,20 @@ contains
 
   subroutine inverse_of_each_other()
     integer :: i, k
-    real(wp) :: n(3), h(3), f, d, worst, worst_small, bound
+    real(wp) :: n(3), f, share
+    real(wp), parameter :: h(3) = [0.005_wp, 0.01_wp, 0.02_wp]
 
-    h = [0.005_wp, 0.01_wp, 0.02_wp]
-    worst = 0.0_wp
-    worst_small = 0.0_wp
-    bound = 0.0_wp
     do i = 1, 4000
       n = direction(i)
-      do k = 0, 8
+      do k = 0, 17
         f = 0.125_wp*real(k, wp)
         if (k == 4) f = modulo(real(i, wp)*0.381966011_wp, 1.0_wp)
-        d = unit_constant(n*h, f)
-        worst = max(worst, abs(volume_below(n, d, h)/product(h) - f))
-        f = 10.0_wp**(-k - 2)
-        d = unit_constant(n*h, f)
-        worst_small = max(worst_small, abs(volume_below(n, d, h)/product(h) - f))
-        bound = max(bound, volume_below(n, d, h)/product(h) - 1.0_wp, -volume_below(n, d, h))
+        if (k > 8) f = 10.0_wp**(7 - k)
+        share = volume_below(n, unit_constant(n*h, f), h)/product(h)
+        call check('volume below the constant of a fraction', share, f, 1.0e-14_wp)
+        if (k > 8) call check('shares stay within 0 and 1', share >= 0.0_wp .and. share <= 1.0_wp)
       end do
     end do
-    call check('volume below the constant of a fraction is the fraction', worst, 0.0_wp, 1.0e-14_wp)
-    call check('the same for small fractions', worst_small, 0.0_wp, 1.0e-14_wp)
-    call check('shares stay within 0 and 1', bound <= 0.0_wp)
   end subroutine inverse_of_each_other
 
   subroutine against_exact_volumes()
@@ -64,8 +55,7 @@ contains
     third = 1.0_wp/3.0_wp
     call check('plane through three corners', unit_volume([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp), &
                1.0_wp/6.0_wp, 1.0e-15_wp)
-    call check('through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), &
-               0.5_wp, 1.0e-15_wp)
+    call check('at the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), 0.5_wp, 1.0e-15_wp)
     call check('hexagon', unit_volume([third, third, third], 0.4_wp), &
                (1.2_wp**3 - 3.0_wp*0.2_wp**3)/6.0_wp, 1.0e-15_wp)
     call check('flat', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), 0.75_wp, 1.0e-15_wp)
@@ -79,41 +69,37 @@ contains
   !> Components down to 1e-14: the volume must follow the two-dimensional one.
   subroutine nearly_parallel_planes()
     integer :: i, k
-    real(wp) :: worst, small, flat, b
+    real(wp) :: small, b
 
-    worst = 0.0_wp
     do k = 2, 14
       small = 10.0_wp**(-k)
       do i = 1, 99
         b = 0.01_wp*real(i, wp)
-        flat = unit_volume([0.0_wp, 0.4_wp, 0.6_wp], b - 0.5_wp*small)   ! equal to second order
-        worst = max(worst, abs(unit_volume([small, 0.4_wp, 0.6_wp], b) - flat) - small**2)
+        call check('a tiny component changes nothing but its mean', &
+          unit_volume([small, 0.4_wp, 0.6_wp], b), &
+          unit_volume([0.0_wp, 0.4_wp, 0.6_wp], b - 0.5_wp*small), small**2 + 1.0e-15_wp)
       end do
     end do
-    call check('a tiny component changes nothing but its mean', worst, 0.0_wp, 1.0e-15_wp)
   end subroutine nearly_parallel_planes
 
   subroutine slopes()
     integer :: i
-    real(wp) :: m(3), a, step, slope, worst
+    real(wp) :: m(3), a
+    real(wp), parameter :: step = 1.0e-5_wp
 
-    worst = 0.0_wp
-    step = 1.0e-5_wp
     do i = 1, 500
       m = direction(i)
       if (minval(abs(m)) < 0.01_wp) cycle
       a = unit_constant(m, modulo(0.618_wp*real(i, wp), 1.0_wp))
-      slope = (unit_volume(m, a + step) - unit_volume(m, a - step))/(2.0_wp*step)
-      worst = max(worst, abs(slope - unit_area(m, a)))
+      call check('area is the derivative of the volume', unit_area(m, a), &
+        (unit_volume(m, a + step) - unit_volume(m, a - step))/(2.0_wp*step), 1.0e-6_wp)
     end do
-    call check('area is the derivative of the volume', worst, 0.0_wp, 1.0e-6_wp)
   end subroutine slopes
 
   subroutine slabs_add_up()
     integer :: i, d
-    real(wp) :: m(3), f, a, t, worst, low, high
+    real(wp) :: m(3), f, a, t, low, high
 
-    worst = 0.0_wp
     do i = 1, 3000
       m = direction(i)
       f = modulo(0.618_wp*real(i, wp), 1.0_wp)
@@ -122,16 +108,13 @@ contains
       do d = 1, 3
         low = unit_slab(m, a, d, 1, t)
         high = unit_slab(m, a, d, 2, 1.0_wp - t)
-        worst = max(worst, abs(low + high - f))
-        if (low < 0.0_wp .or. low > t .or. high < 0.0_wp) worst = 1.0_wp
+        call check('two slabs make the cell', low + high, f, 1.0e-14_wp)
+        call check('and hold no more', low >= 0.0_wp .and. low <= t .and. high >= 0.0_wp)
       end do
     end do
-    call check('two slabs make the cell', worst, 0.0_wp, 1.0e-14_wp)
     m = [0.0_wp, 0.0_wp, 4.0_wp]   ! normal along z times the edges 1, 2, 4 of a cell of volume 8
-    call check('slab at the lower face is under water', 8*unit_slab(m, 1.0_wp, 3, 1, 0.125_wp), &
-      1.0_wp, 1.0e-15_wp)
-    call check('slab at the upper face is dry', 8*unit_slab(m, 1.0_wp, 3, 2, 0.125_wp), 0.0_wp, &
-      1.0e-15_wp)
+    call check('slab below is wet', 8*unit_slab(m, 1.0_wp, 3, 1, 0.125_wp), 1.0_wp, 1.0e-15_wp)
+    call check('slab above is dry', 8*unit_slab(m, 1.0_wp, 3, 2, 0.125_wp), 0.0_wp, 1.0e-15_wp)
     call check('slab across', 8*unit_slab(m, 1.0_wp, 1, 2, 0.5_wp), 1.0_wp, 1.0e-15_wp)
   end subroutine slabs_add_up
 
@@ -148,17 +131,15 @@ contains
 
   subroutine normals_of_planes()
     integer :: i
-    real(wp) :: n(3), m(3), worst
+    real(wp) :: n(3), m(3)
 
-    worst = 0.0_wp
     do i = 1, 200
       n = [0.2_wp*sin(real(i, wp)), 0.2_wp*cos(3.0_wp*real(i, wp)), 1.0_wp]   ! flat enough
       n = cshift(n, i)*merge(1.0_wp, -1.0_wp, modulo(i, 2) == 0)
       n = n/sum(abs(n))
-      m = unit_normal(shares(n, unit_constant(n, 0.5_wp)))
-      worst = max(worst, maxval(abs(m - n)))
+      call check('normal of a plane that stays in its columns', &
+        unit_normal(shares(n, unit_constant(n, 0.5_wp))), n, 1.0e-13_wp)
     end do
-    call check('normal of a plane that stays in its columns is exact', worst, 0.0_wp, 1.0e-13_wp)
     m = unit_normal(shares([0.0_wp, 0.0_wp, 1.0_wp], 0.1513_wp))
     call check('normal of level water', all(abs(m - [0.0_wp, 0.0_wp, 1.0_wp]) <= 0.0_wp))
     m = unit_normal(spread(spread(spread(0.3_wp, 1, 3), 2, 3), 3, 3))
@@ -168,9 +149,8 @@ contains
   !> Angle between the computed and the true normal of a sphere of radius 10 cells: second order.
   subroutine normal_of_sphere()
     integer :: i
-    real(wp) :: n(3), m(3), x(3), worst
+    real(wp) :: n(3), m(3), x(3)
 
-    worst = 0.0_wp
     do i = 1, 100
       n = direction(11*i + 1)
       if (minval(abs(n)) < 1.0e-3_wp) cycle
@@ -179,9 +159,8 @@ contains
       m = unit_normal(sphere_shares(10.0_wp, floor(x)))
       m = m/norm2(m)
       x = real(floor(x), wp) + 0.5_wp
-      worst = max(worst, norm2(m - x/norm2(x)))
+      call check('normal of a sphere is within 3 degrees', norm2(m - x/norm2(x)) < 0.05_wp)
     end do
-    call check('normal of a sphere is within 3 degrees', worst < 0.05_wp)
   end subroutine normal_of_sphere
 
   !> Shares of the sphere about the origin in the 27 cells around cell number `at`, by points.
@@ -192,9 +171,12 @@ contains
     integer, parameter :: n = 12
     integer :: i, j, k, m
 
+    c = 0.0_wp
     do concurrent (k=1:3, j=1:3, i=1:3)
-      c(i, j, k) = count([(norm2(at + [i, j, k] - 2 + (modulo(m/[1, n, n**2], n) + 0.5_wp)/n) &
-        < radius, m=0, n**3 - 1)])/real(n**3, wp)
+      do m = 0, n**3 - 1
+        c(i, j, k) = c(i, j, k) + merge(1.0_wp, 0.0_wp, norm2(at + [i, j, k] - 2 &
+          + (modulo(m/[1, n, n**2], n) + 0.5_wp)/n) < radius)/n**3
+      end do
     end do
   end function sphere_shares
 

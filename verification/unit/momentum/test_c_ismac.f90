@@ -224,8 +224,7 @@ contains
     call check('part of advection', part(1:16, 2, 2, 3), flow%u(1:16, 2, 2, 3), 1.0e-8_wp)
   end subroutine part_of_advection
 
-  !> Without advection the predictor is the viscous stage, with a free body, wall links and small
-  !! cells.
+  !> Without advection the predictor is the viscous stage, with a free body and small cells.
   subroutine without_advection()
     real(wp), parameter :: dt = 0.05_wp
     type(one_body_t) :: block
@@ -257,8 +256,7 @@ contains
     call check('with a body: velocity', &
       block%flow%u(1:12, 1:12, 1:12, :) - u_expected(1:12, 1:12, 1:12, :), 0.0_wp, 1.0e-7_wp)
     call check('with a body: motion', block%bodies%motion - bodies%motion, 0.0_wp, 1.0e-6_wp)
-    call check('body: force', viscous%force(:, 1), expected(:, 1), &
-               1.0e-6_wp*norm2(expected(1:3, 1)))
+    call check('force', viscous%force(:, 1), expected(:, 1), 1.0e-6_wp*norm2(expected(1:3, 1)))
     call check('with a body: it is dragged', norm2(bodies%motion(:, 1) - [0.3_wp, -0.2_wp, 0.1_wp, &
       2.0_wp, 1.0_wp, -3.0_wp]) > 0.1_wp)
   end subroutine without_advection

@@ -71,8 +71,7 @@ contains
     call after_transport()
   end subroutine test_half_kick
 
-  !> Cells in liquid get the other half; all others get the whole later, and both together leave out
-  !! none.
+  !> Cells in liquid get the other half, all others the whole later; none is left out.
   subroutine after_transport()
     real(wp), parameter :: gain(3) = dt*[7.0_wp, -11.0_wp, 13.0_wp]   !! of the whole [m/s]
 

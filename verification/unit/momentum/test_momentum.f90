@@ -7,8 +7,7 @@ module test_momentum_m
   use boundary_m, only: fill_velocity_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
-  use elliptic_solver_m, only: elliptic_solver_t
-  use liquid_alone_m, only: balance_solver
+  use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
     begin_subcycle, finish_transport
   use liquid_fill_m, only: fill_liquid
@@ -74,7 +73,7 @@ contains
 
     transport%subcycles = 1
     if (present(subcycles)) transport%subcycles = subcycles
-    solver = balance_solver(grid)
+    call elliptic_solver_init(grid, solver)
     call begin_transport(grid, old, new, dt, solver, transport, flow)
     do subcycle = 1, transport%subcycles
       call begin_subcycle(grid, old, subcycle, step, transport)
@@ -88,8 +87,7 @@ contains
     call finish_transport(grid, new, transport, flow)
   end subroutine carry
 
-  !> Face velocity of a vortex about the y axis, zero on the sides and free of divergence, with a
-  !! uniform stream.
+  !> Face velocity of a vortex about the y axis, without divergence, with a uniform stream.
   subroutine vortex(speed, with_stream)
     real(wp), intent(in) :: speed, with_stream(3)
     integer :: i, k
@@ -184,8 +182,7 @@ contains
     end associate
   end function mass
 
-  !> A box dips into liquid, moves sideways and leaves through the open top; cells open and close,
-  !! the fluid keeps its velocity.
+  !> A box dips into liquid, moves and leaves through the top; the fluid keeps its velocity.
   subroutine boxes_in_uniform_fluid()
     real(wp), parameter :: half(3) = [0.033_wp, 0.027_wp, 0.0318_wp]
     real(wp) :: centre(3), worst, angle

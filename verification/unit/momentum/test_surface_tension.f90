@@ -98,8 +98,7 @@ contains
       *(1.0_wp + zx**2) - 2.0_wp*zx*zy*bow(6))/(1.0_wp + zx**2 + zy**2)**1.5_wp
   end function exact_curvature
 
-  !> Find the tension; largest error of the curvature in surface cells away from the sides, and
-  !! whether there are any.
+  !> Find the tension; largest error of the curvature away from the sides, and whether there is any.
   subroutine find_error(d, way)
     integer, intent(in) :: d, way
     integer :: i, j, k

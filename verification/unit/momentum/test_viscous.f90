@@ -1,5 +1,4 @@
-!> Implicit viscosity: exact shear past a wall inside the cells, small cells, momentum of the stage,
-!! waves that decay.
+!> Implicit viscosity: exact shear past a wall, small cells, momentum, waves that decay.
 module test_viscous_m
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use check_m, only: check, wp, pi
@@ -106,8 +105,7 @@ contains
     end associate
   end subroutine build
 
-  !> A long step brings the steady shear flow between the moving surface and the upper wall of the
-  !! tank, at rest or moving.
+  !> A long step brings the steady shear flow between the moving surface and the upper wall.
   subroutine shear_above_a_wall()
     real(wp), parameter :: upper(4) = [0.0_wp, 0.0_wp, 0.0_wp, lid]
     real(wp) :: worst, z
@@ -163,7 +161,7 @@ contains
     call check('and the sweeps had ended', viscous%iterations > 11)
     call make_wall(heights(2))
     call solve(1.0e7_wp)
-    call check('a thousand sweeps are left to conjugate gradients', viscous%spread < 1.0_wp &
+    call check('conjugate gradients instead', viscous%spread < 1.0_wp &
                .and. viscous%iterations <= 10)
   end subroutine few_sweeps
 
@@ -242,8 +240,7 @@ contains
     call omp_set_num_threads(most)
   end subroutine waves_in_closed_box
 
-  !> Waves in a periodic box of odd numbers of cells, where first and last cell are of one colour:
-  !! each decays by its own factor.
+  !> Waves in a periodic box of odd numbers of cells: each decays by its own factor.
   subroutine waves_in_odd_box(number)
     real(wp), intent(in) :: number   !! nu dt/h^2
     integer, parameter :: n(3) = [5, 7, 9], mode(3, 2) = reshape([2, 3, 4, 1, 0, 2], [3, 2])

@@ -1,5 +1,4 @@
-!> The sums over the fluid in a row of results: what a cell holds counts, not what its level would
-!! have it hold.
+!> Sums over the fluid in a row of results: what a cell holds counts, not what its level tells.
 module test_diagnostics_m
   use check_m, only: check, wp
   use case_types_m, only: case_t
@@ -83,8 +82,7 @@ contains
     row = make_row(case%fluid, 0.0_wp, state, report)
   end subroutine look
 
-  !> Potential energy of level liquid is that of a prism, wherever the level lies in a cell, less
-  !! what a block displaces of it.
+  !> Potential energy of level liquid is that of a prism, less what a block displaces of it.
   subroutine potential()
     real(wp), parameter :: area = 0.4_wp*0.8_wp, g = 9.81_wp   !! [m2], [m/s2]
     real(wp) :: depth, expected

@@ -119,8 +119,7 @@ contains
     call check('blocks come back', other%blocks%v(3, 2), s%blocks%v(3, 2))
   end subroutine test_dry
 
-  !> Overwrite one byte after the other, all through the file: what is read is either whole or
-  !! refused.
+  !> Overwrite one byte after the other: what is read is either whole or refused.
   subroutine test_damage()
     type(sample_t) :: s, other
     character(18), allocatable :: before(:)

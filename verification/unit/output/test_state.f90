@@ -2,7 +2,7 @@
 ! ranks: 2 3
 module test_state_m
   use check_m, only: check, wp, i8
-  use parallel_m, only: nproc, my_rank
+  use parallel_m, only: nproc
   use grid_m, only: grid_t
   use state_m, only: list_state
   use state_list_m, only: state_list_t, checksum_of_cells
@@ -105,8 +105,7 @@ contains
     x = nearest(x, 1.0_wp)
   end subroutine touch
 
-  !> The sum over the blocks of all processes is the sum over the whole domain; exchanged elements
-  !! show.
+  !> The sum over the blocks of all processes is that of the domain; exchanged elements show.
   subroutine test_checksum_of_cells()
     type(sample_t), target :: s
     type(grid_t), target :: whole

@@ -240,8 +240,7 @@ contains
                *(box%bodies%motion(1:3, 1) - motion(1:3)), dt*force(1:3, 1), 1.0e-13_wp)
   end subroutine pressed_box
 
-  !> Liquid under gas around a held tilted box, level inside a cell: nothing moves, and the pressure
-  !! is the weight above.
+  !> Liquid under gas around a held tilted box: nothing moves, the pressure is the weight above.
   subroutine still_water()
     real(wp) :: expected, worst, g(3)
     integer :: k
@@ -305,8 +304,7 @@ contains
     associate (rhs => pressure%system%solver%rhs)
       call divergence(box%grid, 0.0_wp*box%solid%effective + 1.0_wp, box%flow, &
                       pressure%system%active, rhs, largest)
-      call check('divergence', largest, maxval(abs(rhs(1:12, 1:8, 1:12))) &
-                 /box%grid%volume, 1.0e-12_wp)
+      call check('largest', largest, maxval(abs(rhs(1:12, 1:8, 1:12)))/box%grid%volume, 1.0e-12_wp)
       call check('wall cell', rhs(1, 3, 3), box%grid%area(1)*(0.7_wp + 1.5_wp*short), 1.0e-16_wp)
     end associate
   end subroutine accelerations_at_faces
@@ -382,8 +380,7 @@ contains
     call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, dt, a, box%flow%p)
   end subroutine carry
 
-  !> Largest error of the open cells, but for those at the sides of the tank, beside which the
-  !! pressure is that of a wall.
+  !> Largest error of the open cells but for those at the sides, where a wall tells the pressure.
   real(wp) function worst(curvature) result(error)
     real(wp), intent(in) :: curvature
     real(wp) :: way(3), arm(3), share, x(3)

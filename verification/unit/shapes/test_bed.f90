@@ -124,8 +124,7 @@ contains
     call update_solid(fraction, grid, none, solid)
   end subroutine fill
 
-  !> Under a plane the solid in a column of cells is as high as the plane in its middle; a column of
-  !! side faces likewise.
+  !> Under a plane the solid in a column of cells or of side faces is as high as the plane there.
   subroutine volume_of_slope()
     type(cut_cell_t) :: cut
     real(wp) :: worst(5), height(3), at
@@ -219,8 +218,7 @@ contains
     call make_shape(case%shape(1), shapes(1), message)
   end subroutine hexapod
 
-  !> The surface of the shape at a pose as the bed, three corners for each triangle, as an STL file
-  !! has it.
+  !> The surface of the shape at a pose as the bed, three corners a triangle as in an STL file.
   subroutine lie_as_bed(x, q)
     real(wp), intent(in) :: x(3), q(4)
     type(bed_form_t) :: fresh
@@ -262,8 +260,7 @@ contains
       [0.03_wp, 0.06_wp, 0.4_wp], 1.0e-15_wp)
   end subroutine periodic_bed
 
-  !> From a plane the distance is the height above it times the cosine of its slope; also inside,
-  !! as deep as is asked.
+  !> Distance from a plane: the height above it times the cosine of its slope, also inside.
   subroutine distance_from_slope()
     real(wp) :: normal(3), x(3), d, outward(3), exact, worst(3)
     integer :: i, v
@@ -398,8 +395,7 @@ contains
     call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
     call find_surface_points(walls, blocks, 0.0_wp, contact, points)
     call check('an edge on a saddle touches it', points%n > 0)
-    call check('how deep it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
-      1.0e-12_wp)
+    call check('its depth', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), 1.0e-12_wp)
   end subroutine edge_on_saddle
 
 end module test_bed_m

@@ -154,8 +154,7 @@ contains
     end do
   end subroutine built_of_parts
 
-  !> Volume and inertia of a block from the polygons of its surface, which know nothing of
-  !! tetrahedra.
+  !> Volume and inertia of a block from the polygons of its surface, without tetrahedra.
   subroutine by_surface(s, facet, corner)
     type(shape_t), intent(in) :: s
     integer, intent(in) :: facet(:), corner(:)
@@ -179,8 +178,7 @@ contains
       call build('tetrapod', [h, 0.0_wp, 0.0_wp], r, s)
       volume(r) = s%volume/h**3
       j = (s%inertia(1, 1) + s%inertia(2, 2) + s%inertia(3, 3))/3
-      call check('tetrapod: the same about every axis', flat(s%inertia), &
-        flat(diagonal([j, j, j])), 1e-13_wp*j)
+      call check('tetrapod: isotropic', flat(s%inertia), flat(diagonal([j, j, j])), 1e-13_wp*j)
     end do
     call check('tetrapod: volume', volume(4) + (volume(4) - volume(2))/3, 0.280_wp, 5e-4_wp)
     call check('tetrapod: at least second order', volume(2) > volume(4) &

@@ -80,8 +80,7 @@ contains
                speed*sim%clock%dt*0.08_wp*0.0613_wp, 1.0e-15_wp)
   end subroutine uniform_current
 
-  !> A block that is moved at a constant rate does so whatever pushes, feels the water, and the
-  !! water is kept.
+  !> A block moved at a constant rate goes on whatever pushes, feels the water, and keeps the water.
   subroutine moved_block()
     type(world_t) :: sim
     real(wp), parameter :: rate(3) = [0.2_wp, -0.1_wp, 0.15_wp], spin(3) = [0.0_wp, 0.0_wp, 5.0_wp]

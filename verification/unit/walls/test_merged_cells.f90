@@ -72,14 +72,13 @@ contains
     call check('with free slip the wall bears nothing', to_wall, 0.0_wp, 1.0e-14_wp*sum(mass))
     call check('across the wall a small lies between wall and target', u(4, 5, top, 3), &
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
-    call check('with free slip all move alike', u(4, 5, top, 1:2), &
-               u(4, 5, top + 1, 1:2), 1.0e-12_wp)
+    call check('with slip all move alike', u(4, 5, top, 1:2), u(4, 5, top + 1, 1:2), 1.0e-12_wp)
     merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the small cell
     call random_field(seed, u)
     total = momentum(u)
     before = u
     call share()
-    call check('with a layer it is kept too', momentum(u) + sum(to_wall, 2), total, &
+    call check('with a layer it is kept', momentum(u) + sum(to_wall, 2), total, &
                1.0e-11_wp*sum(mass))
     call the_lever(before(4, 5, top, :), before(4, 5, top + 1, :))
     call check('along the wall a small has more of the velocity of its target', u(4, 5, top, 1:2), &

@@ -178,8 +178,7 @@ contains
     call check('some is held', maxval(abs(held(1:3, :, 1))) > 1.0_wp)
   end subroutine part_of_the_wall
 
-  !> What the faces give, the fluid and the bodies get: fluid that shares accelerations, and two
-  !! bodies that share the walls.
+  !> What the faces give, the fluid and both bodies get, also where cells share accelerations.
   subroutine momentum_of_all()
     type(rigid_motion_t) :: two
     real(wp) :: from_faces(3), of_fluid(3), forces(6, 2)

@@ -97,8 +97,7 @@ contains
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
       call find_centres(box%grid, box%solid, box%bodies, u, merged)
-      call check('short link', centre(), layer(counts(i), 1.0_wp)/layer(of_fluid, 1.0_wp), &
-                 1.0e-12_wp)
+      call check('link', centre(), layer(counts(i), 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
     end do
   end subroutine as_the_links_pull
 
