@@ -31,8 +31,8 @@ module springs_m
     type(displacements_t) :: before              !! work: displacements of the substep before
     real(wp), allocatable :: support(:, :)
       !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
-    !> Where bodies were, and how they turned, when a substep began: (3, n), (4, n), (3, n), (3, n).
-    real(wp), allocatable :: x(:, :), q(:, :), l(:, :), omega(:, :)
+    !> Where bodies were, and how they turned, when a substep began: (3, n), q (4, n).
+    real(wp), allocatable :: x(:, :), lost(:, :), q(:, :), l(:, :), omega(:, :)
     real(wp) :: substep = 0.0_wp                 !! with which `load_if_still` found forces [s]
   contains
     procedure, pass(contacts) :: init
@@ -57,7 +57,7 @@ contains
     call reserve_displacements(1, contacts%before)
     n = blocks%n
     allocate (contacts%support(6, n), contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), &
-      contacts%omega(3, n), source=0.0_wp)
+      contacts%omega(3, n), contacts%lost(3, n), source=0.0_wp)
   end subroutine init
 
   subroutine detect(walls, contacts, blocks)
@@ -179,6 +179,7 @@ contains
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
       contacts%x(:, b) = blocks%x(:, b)
+      contacts%lost(:, b) = blocks%lost(:, b)
       contacts%q(:, b) = blocks%q(:, b)
       contacts%l(:, b) = blocks%l(:, b)
       contacts%omega(:, b) = blocks%omega(:, b)
@@ -193,6 +194,7 @@ contains
       do b = 1, blocks%n
         if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
         blocks%x(:, b) = contacts%x(:, b)
+        blocks%lost(:, b) = contacts%lost(:, b)
         blocks%q(:, b) = contacts%q(:, b)
         blocks%l(:, b) = contacts%l(:, b)
         blocks%omega(:, b) = contacts%omega(:, b)

@@ -53,7 +53,7 @@ module light_m
     real(wp), allocatable :: force(:, :)          !! (6, n) buoyancy and drag [N, N m]
     real(wp), allocatable :: start(:, :)
       !! (6, n) velocity and own angular momentum at the start of a step [m/s, kg m2/s]
-    real(wp), allocatable :: x(:, :), q(:, :)     !! (3, n), (4, n) poses likewise
+    real(wp), allocatable :: x(:, :), lost(:, :), q(:, :)   !! poses likewise, q (4, n)
   end type light_t
 
 contains
@@ -180,6 +180,7 @@ contains
 
     light%wet_before = light%wet
     light%x = blocks%x
+    light%lost = blocks%lost
     light%q = blocks%q
     call drift(0.5_wp*dt, blocks)
     call find_level(blocks, light)
@@ -212,6 +213,7 @@ contains
       blocks%fluid_torque(:, b) = light%force(4:6, b)
     end do
     blocks%x = light%x
+    blocks%lost = light%lost
     blocks%q = light%q
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle

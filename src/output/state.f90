@@ -101,6 +101,7 @@ contains
     call list%add('/blocks/exit_time', 's', blocks%exit_time)
     call list%add('/blocks/raised', 'm', blocks%raised)
     call list%add('/blocks/position', 'm', blocks%x)
+    call list%add('/blocks/lost', 'm', blocks%lost)
     call list%add('/blocks/quaternion', '1', blocks%q)
     call list%add('/blocks/velocity', 'm/s', blocks%v)
     call list%add('/blocks/angular_momentum', 'kg m2/s', blocks%l)

@@ -23,6 +23,7 @@ contains
     call check_free_top()
     call check_top_at_end()
     call check_free_fall()
+    call check_survey()
     call check_prescribed()
     call check_after_fluid()
   end subroutine test_rigid_body
@@ -128,6 +129,21 @@ contains
     call check('free fall', &
       blocks%x(:, 1) - (x + t*v + 0.5_wp*t**2*(g + [0, 1, 0])), 0.0_wp, 1.0e-14_wp)
   end subroutine check_free_fall
+
+  !> In coordinates of a survey a substep of a slow body is as long as their last digit.
+  subroutine check_survey()
+    integer :: n
+
+    call start('&body shape="ball" position=512344,5621080,.1 velocity=1e-5,-3e-6,1e-6/ &body ' &
+      //'shape="ball" position=512345,5621080,.1 velocity=1e-5,-3e-6,1e-6 fixed=t/')
+    do n = 1, 10000
+      call drift(1.0e-4_wp, blocks)
+    end do
+    do n = 1, 2
+      call check('slow, far from zero', &
+        blocks%x(:, n) - [512343.0_wp + n, 5621080.0_wp, 0.1_wp], blocks%v(:, n), 1.0e-9_wp)
+    end do
+  end subroutine check_survey
 
   !> A fixed body with given rates moves and turns at them whatever acts on it.
   subroutine check_prescribed()

@@ -319,6 +319,7 @@ contains
     call step(30, 1.0e-3_wp, world)
     call begin(world%case, world, again)
     again%blocks%x = world%blocks%x
+    again%blocks%lost = world%blocks%lost
     again%blocks%q = world%blocks%q
     again%blocks%v = world%blocks%v
     again%blocks%l = world%blocks%l
