@@ -1,12 +1,22 @@
 """A few trials of the long fault tests in soak/, which `make test` has time for."""
 
+import random
 import signal
 from pathlib import Path
 
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import any_number, full_disk, memory, moved_folders, signals, still_pile, two_programs
+from soak import (
+    any_number,
+    full_disk,
+    memory,
+    moved_folders,
+    signals,
+    still_pile,
+    strangers,
+    two_programs,
+)
 from soak.shop import Shop, open_shop
 
 MICS, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
@@ -96,6 +106,14 @@ def test_stop_and_go_on_elsewhere(tmp_path: Path) -> None:
 def test_memory_does_not_grow(tmp_path: Path) -> None:
     """With a restart file after every step a run takes no more memory in the end."""
     said, found = memory.growth(ALONE, 600, tmp_path)
+    assert found == [], said
+
+
+@pytest.mark.parametrize("way", strangers.WAYS)
+def test_damaged_run(way: str, tmp_path: Path) -> None:
+    """It is told in a line with the name of the file, or does not matter."""
+    whole = strangers.write_run(tmp_path / "run", strangers.Motion(t_end=0.2))
+    said, found = strangers.damaged_run(way, whole, random.Random(way), tmp_path)
     assert found == [], said
 
 

@@ -254,6 +254,8 @@ KINDS: dict[str, Damage] = {
     "times that fall": put("series/time", np.arange(11.0)[::-1]),
     "a time that is none": put("bodies/time", np.full(11, np.nan)),
     "no cells": put("grid/x", [0.0]),
+    "a provenance of nothing": lambda h5: (drop("provenance")(h5), h5.create_group("provenance")),
+    "a corner without a place": put("shapes/hexapod/points", np.full((8, 3), np.nan)),
     "a corner that is not there": put("shapes/hexapod/triangles", [[0, 1, 10**6]]),
     "a shape of no name": put("bodies/shape", [b"\xff\xfe"] * 9),
     "a status in words": say("exit_status", "well"),

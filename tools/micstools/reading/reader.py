@@ -26,7 +26,7 @@ from micstools import files
 from micstools.reading import namelist
 from micstools.reading.profiles import along_line
 from micstools.reading.result_file import BadRun as BadRun
-from micstools.reading.result_file import indices, numbers, require_shape, rising, take
+from micstools.reading.result_file import finite, indices, numbers, require_shape, rising, take
 from micstools.reading.schema import require_types, variables
 from micstools.shapes.geometry import Array, IntArray, place
 from micstools.shapes.shape import Shape
@@ -430,7 +430,10 @@ def _plain(value: Any) -> Any:
 
 def _read_provenance(h5: h5py.File) -> dict[str, Any]:
     found = {name: _plain(value) for name, value in h5["provenance"].attrs.items()}
-    return found | {"exit_status": int(found.get("exit_status", -1))}
+    return found | {
+        "namelist": str(found["namelist"]),
+        "exit_status": int(found.get("exit_status", -1)),
+    }
 
 
 def _read_grid(h5: h5py.File) -> Grid:
@@ -449,7 +452,8 @@ def _read_shapes(h5: h5py.File) -> dict[str, Shape]:
 
 
 def _read_shape(name: str, group: h5py.Group) -> Shape:
-    points, centres = numbers(group, "points", None, 3), numbers(group, "sphere_centre", None, 3)
+    points = finite(numbers(group, "points", None, 3), f"shape {name}")
+    centres = numbers(group, "sphere_centre", None, 3)
     return Shape(
         name=name,
         points=points,
@@ -466,7 +470,7 @@ def _read_shape(name: str, group: h5py.Group) -> Shape:
 def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
     if "bed" not in h5:
         return np.empty((0, 3)), np.empty((0, 3), dtype=int)
-    points = numbers(h5["bed"], "points", None, 3)
+    points = finite(numbers(h5["bed"], "points", None, 3), "bed")
     return points, indices(numbers(h5["bed"], "triangles", None, 3), "bed", len(points))
 
 

@@ -81,6 +81,13 @@ def require_shape(group: h5py.Group, name: str, *shape: int | None) -> None:
         raise ValueError(f"{name} has shape {found.shape} of {found.dtype}")
 
 
+def finite(values: Any, name: str) -> Any:
+    """Coordinates, none of which may be missing."""
+    if not (np.abs(values) < 1e20).all():
+        raise ValueError(f"{name} has no place")
+    return values
+
+
 def rising(values: Any, name: str, strictly: bool = False) -> Any:
     """Coordinates or times, which must be finite and rise."""
     steps = np.diff(values)
