@@ -385,9 +385,8 @@ class Run:
     def to_csv(self, path: str | Path) -> Path:
         """Write `blocks` as a table."""
         table = self.blocks
-        for column in ("shape", "name"):
-            table[column] = table[column].map(files.as_text)
-        table.to_csv(path, index=False, lineterminator="\n")
+        texts = {column: table[column].map(files.as_text) for column in ("shape", "name")}
+        table.assign(**texts).to_csv(path, index=False, lineterminator="\n")
         return Path(path)
 
     def series_to_csv(self, path: str | Path) -> Path:
