@@ -61,23 +61,21 @@ contains
 
   !> A torque-free top keeps its angular momentum exactly and its energy to second order.
   subroutine check_free_top()
-    real(wp) :: l(3), energy, worst, time_step
+    real(wp) :: l(3), energy, time_step
     integer :: n
 
     ! near the unstable middle axis
     call start(brick//'angular_velocity=1,10,.5/')
     l = blocks%l(:, 1)
     energy = kinetic_energy(blocks)
-    worst = 0.0_wp
     time_step = 2.0e-3_wp
     do n = 1, 10000
       call drift(0.5_wp*time_step, blocks)
       call kick(no_gravity, time_step, blocks%contact_force, blocks%contact_torque, blocks)
       call drift(0.5_wp*time_step, blocks)
-      worst = max(worst, abs(kinetic_energy(blocks)/energy - 1.0_wp))
+      call check('energy of the top', kinetic_energy(blocks)/energy, 1.0_wp, 1.0e-4_wp)
     end do
     call check('angular momentum', blocks%l(:, 1) - l, 0.0_wp, 1.0e-12_wp*norm2(l))
-    call check('energy of the top', worst, 0.0_wp, 1.0e-4_wp)
     call check('quaternion stays one', norm2(blocks%q(:, 1)), 1.0_wp, 1.0e-15_wp)
     call check('omega belongs to l', blocks%l(:, 1) - matmul(space_tensor(blocks%q(:, 1), &
       world%shapes(1)%inertia), blocks%omega(:, 1)), 0.0_wp, 1.0e-12_wp*norm2(l))

@@ -78,12 +78,11 @@ contains
   !> A sphere inscribed in a tetrahedron under the surface touches all four faces.
   subroutine inscribed_spheres()
     type(shape_t) :: s
-    real(wp) :: x(3, 4), n(3), worst
+    real(wp) :: x(3, 4), n(3)
     integer :: t, m, a
     integer, parameter :: others(3, 4) = reshape([2, 3, 4, 1, 3, 4, 1, 2, 4, 1, 2, 3], [3, 4])
 
     call build('tetrapod', 'inscribed', 2, 0.0_wp, s)
-    worst = 0.0_wp
     m = 0
     do t = 1, size(s%tet, 2)
       if (.not. any(s%triangle_tet == t)) cycle
@@ -92,12 +91,11 @@ contains
       do a = 1, 4
         associate (o => others(:, a))
           n = cross(x(:, o(2)) - x(:, o(1)), x(:, o(3)) - x(:, o(1)))
-          worst = max(worst, abs(abs(dot_product(s%sphere_centre(:, m) - x(:, o(1)), n)) &
-            /norm2(n)/s%sphere_radius(m) - 1))
+          call check('inscribed: each touches four faces', abs(dot_product(s%sphere_centre(:, m) &
+            - x(:, o(1)), n))/norm2(n)/s%sphere_radius(m), 1.0_wp, 1e-12_wp)
         end associate
       end do
     end do
-    call check('inscribed: each touches four faces', worst, 0.0_wp, 1e-12_wp)
     call check('inscribed: one for each tetrahedron at the surface', size(s%sphere_radius), m)
     call build('hexapod', 'inscribed', 1, 0.0_wp, s)
     call check('inscribed 1: heights', heights(s), [30.00e-3_wp, 26.53e-3_wp, 25.77e-3_wp], 5e-6_wp)

@@ -53,43 +53,37 @@ contains
   !> Compare cells and faces with counts of points in the hexapod.
   subroutine count_points(n)
     integer, intent(in) :: n
-    real(wp) :: worst(3), share, centroid(3)
-    integer :: i, j, k, d, m
+    real(wp) :: share, centroid(3)
+    integer :: i, j, k, d, m, low(3)
 
     call recount(n)
-    worst = 0.0_wp
     do k = 1, 13
       do j = 1, 15
         do i = 1, 14
           call points([i, j, k], [n, n, n], 0, share, centroid)
-          worst(1) = max(worst(1), abs(solid%alpha(i, j, k) - share))
+          call check('share of a cell', solid%alpha(i, j, k), share, 1.0e-12_wp)
           do d = 1, 3
+            low = [i, j, k] - unit_step(:, d)
+            if (any(low < 1)) cycle
             call points([i, j, k], merge(1, n, [1, 2, 3] == d), d, share, centroid)
-            if (any([i, j, k] - unit_step(:, d) < 1)) cycle
             if (solid%alpha(i, j, k) >= 1.0_wp) share = 1.0_wp
-            if (solid%alpha(i - unit_step(1, d), j - unit_step(2, d), k - unit_step(3, d)) &
-                >= 1.0_wp) share = 1.0_wp
-            worst(2) = max(worst(2), abs(1.0_wp - solid%aperture(i, j, k, d) - share))
+            if (solid%alpha(low(1), low(2), low(3)) >= 1.0_wp) share = 1.0_wp
+            call check('share of a face', 1.0_wp - solid%aperture(i, j, k, d), share, 1.0e-12_wp)
           end do
         end do
       end do
     end do
-    call check('share of cells', worst(1), 0.0_wp, 1.0e-12_wp)
-    call check('share of faces', worst(2), 0.0_wp, 1.0e-12_wp)
     do m = 1, solid%body_cell(2) - 1
       call points(solid%cell(:, m), [n, n, n], 0, share, centroid)
-      worst(3) = max(worst(3), maxval(abs(solid%cell_centroid(:, m) - centroid)))
+      call check('centroid in a cell', solid%cell_centroid(:, m), centroid, 1.0e-12_wp)
     end do
-    call check('centroids in cells', worst(3), 0.0_wp, 1.0e-12_wp)
-    worst(3) = 0.0_wp
     do m = 1, solid%body_face(2) - 1
       associate (f => solid%face(:, m))
         if (solid%face_beta(m) >= 1.0_wp) cycle
         call points(f(1:3), merge(1, n, [1, 2, 3] == f(4)), f(4), share, centroid)
-        worst(3) = max(worst(3), maxval(abs(solid%face_centroid(:, m) - centroid)))
+        call check('centroid on a face', solid%face_centroid(:, m), centroid, 1.0e-12_wp)
       end associate
     end do
-    call check('centroids on faces', worst(3), 0.0_wp, 1.0e-12_wp)
     call check('cells are full, cut and empty', any(solid%alpha >= 1.0_wp) .and. solid%n_cut > 50)
   end subroutine count_points
 

@@ -127,38 +127,34 @@ contains
   !> Under a plane the solid in a column of cells or of side faces is as high as the plane there.
   subroutine volume_of_slope()
     type(cut_cell_t) :: cut
-    real(wp) :: worst(5), height(3), at
+    real(wp) :: height(3), at
     integer :: i, j, m
 
     call sloping_tank()
     call fill()
     call cut_cell_init(cut)
-    worst = 0.0_wp
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m))
         call load_cut_cell(solid, m, grid%face(c, [1, 2, 3]), grid%h, cut)
-        worst(4) = max(worst(4), abs(cut%open - 1.0_wp + solid%alpha(c(1), c(2), c(3))))
+        call check('tetrahedra fill a cut cell', cut%open + solid%alpha(c(1), c(2), c(3)), 1.0_wp, &
+          1.0e-13_wp)
       end associate
     end do
+    call check('there are many', solid%n_cut > 50)
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
         height = [dot_product(slope, [grid%face(i, 1), grid%centre(j, 2), 1.0_wp]), &
           dot_product(slope, [grid%centre(i, 1), grid%face(j, 2), 1.0_wp]), &
           dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])]
-        worst(:2) = max(worst(:2), abs(sum(1.0_wp - solid%aperture(i, j, 1:9, 1:2), 1)*grid%h(3) &
-          - height(:2)))
-        worst(3) = max(worst(3), abs(sum(solid%alpha(i, j, 1:9))*grid%h(3) - height(3)))
+        call check('height of the columns', grid%h(3)*[9 - sum(solid%aperture(i, j, 1:9, 1:2), 1), &
+          sum(solid%alpha(i, j, 1:9))], height, 1.0e-15_wp)
         call check('centres inside', all((solid%inside(i, j, 1:9) == 1) &
           .eqv. grid%centre([(m, m=1, 9)], 3) < height(3)))
         at = dot_product(slope, [grid%face(i, 1), grid%face(j, 2), 1.0_wp])
-        worst(5) = max(worst(5), maxval(abs(solid%aperture(i, j, 1:9, 3) &
-          - [(unit_volume([slope(:2)*grid%h(:2), 0.0_wp], grid%face(m, 3) - at), m=1, 9)])))
+        call check('faces in z, below the line of the slope', solid%aperture(i, j, 1:9, 3), &
+          [(unit_volume([slope(:2)*grid%h(:2), 0.0_wp], grid%face(m, 3) - at), m=1, 9)], 1.0e-12_wp)
       end do
     end do
-    call check('height of the columns of faces and cells', worst(:3), 0.0_wp, 1.0e-15_wp)
-    call check('its tetrahedra fill the cut cells', worst(4), 0.0_wp, 1.0e-13_wp)
-    call check('there are many', solid%n_cut > 50)
-    call check('faces in z, below the line of the slope', worst(5), 0.0_wp, 1.0e-12_wp)
   end subroutine volume_of_slope
 
   !> A hexapod as a bed, closed and overhanging, fills the grid as the same hexapod does as a body:
@@ -168,13 +164,12 @@ contains
     type(solid_geometry_t) :: of_body
     type(links_t) :: links, links_of_bed
     type(cut_cell_t) :: a, b
-    real(wp) :: worst(6), m(3), share(2), at
+    real(wp) :: m(3), share(2), at
     integer :: pose, c(3), n, v
 
     call hexapod()
     call cut_cell_init(a)
     call cut_cell_init(b)
-    worst = 0.0_wp
     do pose = 1, 6
       case%body(1)%position = 0.05_wp + 0.01_wp*[(uniform(pose, v, 1) - 0.5_wp, v=1, 3)]
       if (pose > 1) case%body(1)%quaternion = random_rotation(7, pose)
@@ -187,10 +182,11 @@ contains
       call fill()
       links = links_on_grid(of_body)
       links_of_bed = links_on_grid(solid)
-      worst(:5) = max(worst(:5), [maxval(abs(of_body%alpha - solid%alpha)), &
-        maxval(abs(of_body%aperture - solid%aperture)), maxval(abs(links%low - links_of_bed%low)), &
-        maxval(abs(links%high - links_of_bed%high)), &
-        real(maxval(abs(of_body%inside - solid%inside)), wp)])
+      call check('body and bed: cells', of_body%alpha - solid%alpha, 0.0_wp, 1.0e-12_wp)
+      call check('and faces', of_body%aperture - solid%aperture, 0.0_wp, 1.0e-12_wp)
+      call check('links from below', links%low - links_of_bed%low, 0.0_wp, 1.0e-11_wp)
+      call check('links from above', links%high - links_of_bed%high, 0.0_wp, 1.0e-11_wp)
+      call check('centres', all(of_body%inside == solid%inside))
       do n = 1, of_body%n_cut
         c = of_body%cut_cell(:, n)
         if (any(c < 1 .or. c > grid%n)) cycle
@@ -202,13 +198,9 @@ contains
         at = sum(min(m, 0.0_wp)) + uniform(c(1), 10*c(2), c(3))*sum(abs(m))
         call open_below(a, m, at, share(1))
         call open_below(b, m, at, share(2))
-        worst(6) = max(worst(6), abs(share(1) - share(2)))
+        call check('liquid in a cut cell', share(1), share(2), 1.0e-11_wp)
       end do
     end do
-    call check('hexapod as body and as bed: cells, faces', worst(:2), 0.0_wp, 1.0e-12_wp)
-    call check('hexapod as body and as bed: links', worst(3:4), 0.0_wp, 1.0e-11_wp)
-    call check('hexapod as body and as bed: centres', worst(5), 0.0_wp)
-    call check('hexapod as body and as bed: liquid in cut cells', worst(6), 0.0_wp, 1.0e-11_wp)
   end subroutine volume_of_closed_form
 
   !> A tank with a block of a shape, and no bed yet.
@@ -262,30 +254,26 @@ contains
 
   !> Distance from a plane: the height above it times the cosine of its slope, also inside.
   subroutine distance_from_slope()
-    real(wp) :: normal(3), x(3), d, outward(3), exact, worst(3)
+    real(wp) :: normal(3), x(3), d, outward(3), exact
     integer :: i, v
 
     call sloping_tank()
     normal = [-slope(1), -slope(2), 1.0_wp]
     normal = normal/norm2(normal)
-    worst = 0.0_wp
     do i = 1, 500
       x = [0.02_wp, 0.03_wp, -0.05_wp] + [(uniform(i, 2, v), v=1, 3)]*[0.06_wp, 0.04_wp, 0.16_wp]
       exact = normal(3)*(x(3) - slope(3)) + dot_product(normal(1:2), x(1:2))
-      if (bed_covers(walls%bed, x) .neqv. exact < 0.0_wp) worst(1) = 1.0_wp
+      call check('inside the slope', bed_covers(walls%bed, x) .eqv. exact < 0.0_wp)
       call bed_distance(walls%bed, x, 0.01_wp, 0.015_wp, found, d, outward)
       if (exact > 0.01_wp) then
-        if (d < 0.01_wp) worst(2) = 1.0_wp
+        call check('no nearer than asked', d >= 0.01_wp)
       else if (exact < -0.015_wp) then
-        if (d > -0.015_wp) worst(2) = 1.0_wp
+        call check('no less deep than asked', d <= -0.015_wp)
       else
-        worst(2) = max(worst(2), abs(d - exact))
-        worst(3) = max(worst(3), norm2(outward - normal))
+        call check('distance from the slope', d, exact, 1.0e-15_wp)
+        call check('direction from the slope', outward, normal, 1.0e-13_wp)
       end if
     end do
-    call check('inside the slope', worst(1), 0.0_wp)
-    call check('distance from the slope', worst(2), 0.0_wp, 1.0e-15_wp)
-    call check('direction from the slope', worst(3), 0.0_wp, 1.0e-13_wp)
   end subroutine distance_from_slope
 
   !> A trench with vertical walls, closed below: the nearest of bottom, walls and rims.

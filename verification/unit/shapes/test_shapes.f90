@@ -87,18 +87,17 @@ contains
     type(shape_t), intent(in) :: s
     real(wp) :: x(3, 4)
     integer :: m, t
-    logical :: good
 
-    good = .true.
     m = 0
     do t = 1, size(s%tet, 2)
       if (.not. any(s%triangle_tet == t)) cycle
       m = m + 1
       x = s%point(:, s%tet(:, t))
-      good = good .and. all(abs(s%sphere_centre(:, m) - sum(x, 2)/4) < 1e-17_wp)
-      good = good .and. abs(4*pi/3*s%sphere_radius(m)**3/tet_volume(x) - 1) < 1e-14_wp
+      call check(kind//': sphere at the centroid', s%sphere_centre(:, m), sum(x, 2)/4, 1e-17_wp)
+      call check(kind//': of equal volume', 4*pi/3*s%sphere_radius(m)**3/tet_volume(x), 1.0_wp, &
+        1e-14_wp)
     end do
-    call check(kind//': equal spheres at the centroids', good .and. m == size(s%sphere_radius))
+    call check(kind//': one for each', m, size(s%sphere_radius))
   end subroutine check_spheres
 
   pure function weighted_centroid(s) result(x)
@@ -130,18 +129,13 @@ contains
     type(shape_t) :: s
     real(wp) :: x(3)
     integer :: m
-    logical :: turned, mirrored
 
     call build('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, s)
-    turned = .true.
-    mirrored = .true.
     do m = 1, size(s%sphere_radius)
       x = s%sphere_centre(:, m)
-      turned = turned .and. is_centre(s, [-x(2), x(1), x(3)])
-      mirrored = mirrored .and. is_centre(s, [-x(1), x(2), x(3)])
+      call check('hexapod: a quarter turn', is_centre(s, [-x(2), x(1), x(3)]))
+      call check('hexapod: a mirror', is_centre(s, [-x(1), x(2), x(3)]))
     end do
-    call check('hexapod: spheres keep their places in a quarter turn', turned)
-    call check('hexapod: spheres keep their places in a mirror', mirrored)
   end subroutine hexapod_symmetry
 
   pure logical function is_centre(s, y)
