@@ -49,6 +49,11 @@ def test_bits_stay_in_other_units(name: str, tmp_path: Path) -> None:
     similarity.froude(similarity.pair(name), tmp_path)
 
 
+def test_round_off_of_calm_water_has_no_unit(tmp_path: Path) -> None:
+    """Its viscous solve ended at 1e-21 m/s."""
+    similarity.froude(similarity.calm(), tmp_path)
+
+
 def test_a_spinning_block_has_its_mirror_image(tmp_path: Path) -> None:
     """To the tolerance of viscosity, 1e-9 of the largest velocity; with the motion of the block in
     one of the cells beside a face for both, forces differed by 2 %."""

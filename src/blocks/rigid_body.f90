@@ -250,7 +250,7 @@ contains
     end associate
   end subroutine drift_body
 
-  !> Move a body by a way, with what rounding has lost of it before: the coordinates of a survey have
+  !> Move a body by a way, with what rounding has lost of it before: coordinates of a survey have
   !! 1e-9 m, as much as a slow body goes in a substep. Source: Kahan (1965), Comm. ACM 8, 40.
   pure subroutine shift_body(way, b, blocks)
     real(wp), intent(in) :: way(3)   !! [m]

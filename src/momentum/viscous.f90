@@ -301,7 +301,7 @@ contains
       end do
     end associate
     call global_max(m)
-    scale = max(m(1), 1.0e-12_wp, maxval([0.0_wp, abs(bodies%motion(1:3, :))]), &
+    scale = max(m(1), tiny(scale), maxval([0.0_wp, abs(bodies%motion(1:3, :))]), &
                 maxval(abs(grid%side_velocity)))
   end subroutine velocity_scale
 

@@ -58,6 +58,23 @@ def pair(name: str) -> World:
     )
 
 
+def calm() -> World:
+    """Water alone, level inside a cell: what moves is round-off."""
+    ends = {f"{d}_{s}": "periodic" for d in "xy" for s in ("min", "max")} | {"z_max": "slip"}
+    thin = {"gas_density": 0.6, "gas_viscosity": 1e-3, "water_level": 2.21875875}
+    thick = {"liquid_density": 3000.0, "liquid_viscosity": 7.2e-4, "gravity": [0.0, 0.0, -9.8125]}
+    jacobi = {"advection": "upwind", "preconditioner": "jacobi", "divergence_tolerance": 1e-6}
+    return World(
+        [
+            ("run", {"physics": "fluid", "t_end": 0.2, "dt": 0.0675, "restart_interval": 0.0}),
+            ("grid", {"cells": [15, 12, 10], "length": [4.31109, 4.93493, 5.00002]}),
+            ("boundary", ends),
+            ("fluid", {**thin, **thick}),
+            ("numerics", jacobi),
+        ]
+    )
+
+
 def froude(world: World, folder: Path) -> None:
     """Lengths times 4, times and speeds times 2, viscosities times 8, tension times 16."""
     same_in_other_units(world, folder, FROUDE)
