@@ -11,6 +11,7 @@ from worlds.world import Broken, Group, World
 
 FEW = 3  # steps in which round-off has not grown
 ROUND_OFF = 1e-9  # of the largest number of its kind
+STIFF = 1e4  # changes by contact over those of places, both of their own size
 MIRROR_X, MIRROR_Y = np.diag([-1, 1, 1]), np.diag([1, -1, 1])
 QUARTER = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
@@ -146,16 +147,21 @@ def axes(world: World, folder: Path) -> None:
 
 def moved(world: World, folder: Path) -> None:
     """Somewhere else in a survey, where round-off is larger."""
-    across = world.value("grid", "length")[0]
+    world = world.changed("numerics", solid_fraction="exact", coupling="monolithic")
+    length, cells = world.value("grid", "length"), world.value("grid", "cells")
+    ways = [37.0 * length[0], -21.0 * length[0], 5.0 * length[0]]
+    far = max(map(abs, [*ways, *world.value("grid", "origin", [0.0])]))
+    digits = 2.0**-52 * far / min(h / n for h, n in zip(length, cells, strict=True))
 
     def change(world: World, _: Array) -> World:
-        return world.shifted([37.0 * across, -21.0 * across, 5.0 * across])
+        return world.shifted(ways)
 
-    same(world, folder, np.eye(3), change=change)
+    same(world, folder, np.eye(3), max(ROUND_OFF, STIFF * digits), change)
 
 
 def bodies(world: World, folder: Path) -> None:
     """The last body first."""
+    world = world.changed("numerics", solid_fraction="exact")
 
     def change(world: World, _: Array) -> World:
         found = [group for group in world.groups if group[0] == "body"][::-1]
