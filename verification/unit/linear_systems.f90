@@ -288,9 +288,11 @@ contains
       do j = lo(2), hi(2)
         do i = lo(1), hi(1)
           y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
-            + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) + cf(i, j, k, 2)*(x(i, j, k) &
-            - x(i, j - 1, k)) + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) + cf(i, j, &
-            k, 3)*(x(i, j, k) - x(i, j, k - 1)) + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+            + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
+            + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
+            + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
+            + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
+            + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
         end do
       end do
     end do

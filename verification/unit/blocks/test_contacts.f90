@@ -264,8 +264,9 @@ contains
     call check('swings back', slip, -nudge, 0.01_wp*nudge)
     call check('rolls on meanwhile', world%blocks%v(1, 1), 3*nudge/7, 0.01_wp*nudge)
     call move(world, 1, 1.25_wp*dt)
-    call check('energy while swinging', kinetic_energy(world%blocks) + world%contact%energy - &
-      0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, 0.01_wp*energy)
+    call check('energy while swinging', kinetic_energy(world%blocks) + world%contact%energy &
+      - 0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, &
+      0.01_wp*energy)
   end subroutine check_swinging_ball
 
   !> The same on a fixed body, spheres on spheres.
@@ -476,8 +477,8 @@ contains
 
     bodies = ''
     do b = 1, 6
-      bodies = bodies//body('plain', [0.02_wp*real(1 + mod(b, 2), wp), 0.025_wp, 0.03_wp*real(b, &
-        wp)], q=random_rotation(4, b), more=trim(merge('release_time=1', '              ', b == 6)))
+      bodies = bodies//body('plain', [0.02_wp*(1 + mod(b, 2)), 0.025_wp, 0.03_wp*b], &
+        q=random_rotation(4, b), more=trim(merge('release_time=1', '              ', b == 6)))
     end do
     call start('sleep=T', '&grid cells=3*2 length=.06,.05,1/ &fluid gravity=1,0,-9.81/ ' &
       //'&shape name="plain" kind="cube" size=.02 refinement=1/ '//bodies, one)
@@ -511,9 +512,9 @@ contains
   pure logical function same(a, b) result(yes)
     type(blocks_t), intent(in) :: a, b
 
-    yes = all(abs(a%x - b%x) <= 0.0_wp) &
-      .and. all(abs(a%q - b%q) <= 0.0_wp) .and. all(abs(a%v - b%v) <= 0.0_wp) .and. &
-      all(abs(a%l - b%l) <= 0.0_wp) .and. all(abs(a%contact_force - b%contact_force) <= 0.0_wp)
+    yes = all(abs(a%x - b%x) <= 0.0_wp) .and. all(abs(a%q - b%q) <= 0.0_wp) &
+      .and. all(abs(a%v - b%v) <= 0.0_wp) .and. all(abs(a%l - b%l) <= 0.0_wp) &
+      .and. all(abs(a%contact_force - b%contact_force) <= 0.0_wp)
   end function same
 
   !> A speed beyond all bounds is reported, not followed; and the Courant limit shortens the

@@ -223,8 +223,9 @@ contains
       longest = 0.0_wp
       do k = 1, 100
         longest = max(longest, norm2(place(now%x_a, now%q_a, radius_a, 2*k) &
-          - place(before%x_a, before%q_a, radius_a, 2*k) - place(now%x_b, &
-          now%q_b, radius_b, 2*k + 1) + place(before%x_b, before%q_b, radius_b, 2*k + 1)))
+          - place(before%x_a, before%q_a, radius_a, 2*k) &
+          - place(now%x_b, now%q_b, radius_b, 2*k + 1) &
+          + place(before%x_b, before%q_b, radius_b, 2*k + 1)))
       end do
       call check('none goes further', longest <= way)
       call check('some nearly as far', longest > 0.6_wp*way)

@@ -31,8 +31,8 @@ contains
 
   !> Corners lie on the inner side of all faces, also of a tetrahedron turned inside out.
   subroutine faces_look_outward()
-    real(wp), parameter :: corner(3, 4) = reshape([0.1_wp, 0.2_wp, &
-      0.0_wp, 1.4_wp, 0.1_wp, 0.3_wp, 0.2_wp, 1.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 1.7_wp], [3, 4])
+    real(wp), parameter :: corner(3, 4) = 0.1_wp*reshape([1, 2, 0, 14, 1, 3, 2, 11, 2, 3, 4, 17], &
+      [3, 4])
     real(wp) :: n(3, 4), d(4), middle(3), x(3, 4)
     integer :: s, f
 

@@ -278,8 +278,8 @@ contains
         a = 1 - unit_step(:, e)
         b = grid%n - unit_step(:, e)
         call check('on grid planes: all faces of full cells are closed, no other', &
-          solid%aperture(1:20, 1:20, 1:40, e) - merge(0.0_wp, 1.0_wp, max(solid%alpha(1:20, &
-          1:20, 1:40), solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3))) > 0.5_wp), 0.0_wp)
+          solid%aperture(1:20, 1:20, 1:40, e) - merge(0.0_wp, 1.0_wp, 0.5_wp < &
+          max(solid%alpha(1:20, 1:20, 1:40), solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)))), 0.0_wp)
       end do
     end do
   end subroutine faces_on_grid_planes

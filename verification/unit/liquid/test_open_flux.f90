@@ -120,8 +120,9 @@ contains
 
     associate (a => first, b => last, open => 1.0_wp - new%alpha(1:8, 1:9, first:last), &
                room => flow%fluid_volume(1:8, 1:9, first:last))
-      imbalance = maxval(abs((room - q(2:9, 1:9, a:b, 1) + q(1:8, 1:9, a:b, 1) - q(1:8, 2:10, a:b, &
-        2) + q(1:8, 1:9, a:b, 2) - q(1:8, 1:9, a + 1:b + 1, 3) + q(1:8, 1:9, a:b, 3))/grid%volume &
+      imbalance = maxval(abs((room - q(2:9, 1:9, a:b, 1) + q(1:8, 1:9, a:b, 1) &
+        - q(1:8, 2:10, a:b, 2) + q(1:8, 1:9, a:b, 2) &
+        - q(1:8, 1:9, a + 1:b + 1, 3) + q(1:8, 1:9, a:b, 3))/grid%volume &
         - (1.0_wp + share)*open), flux%band%number(1:8, 1:9, a:b) > 0)
     end associate
   end function imbalance

@@ -204,8 +204,9 @@ contains
     call check('free box: momentum is force times step', gain(1:3), dt*force(1:3, 1), 1.0e-14_wp)
     call check('free box: spin is torque times step', gain(4:6), dt*force(4:6, 1), 1.0e-15_wp)
     associate (rho => box%flow%rho(1:12, 1:8, 1:12))
-      fluid_gain = box%grid%volume*sum(box%solid%effective(1:12, 1:8, 1:12, 1)*face_mean(rho, &
-        cshift(rho, -1, 1))*(box%flow%uf(1:12, 1:8, 1:12, 1) - before(1:12, 1:8, 1:12, 1)))
+      fluid_gain = box%grid%volume*sum(face_mean(rho, cshift(rho, -1, 1)) &
+        *box%solid%effective(1:12, 1:8, 1:12, 1) &
+        *(box%flow%uf(1:12, 1:8, 1:12, 1) - before(1:12, 1:8, 1:12, 1)))
     end associate
     call check('free box: momentum of fluid and box', fluid_gain + gain(1), 0.0_wp, 1.0e-13_wp)
     call check('free box: momentum changes hands', abs(gain(1)) > 1.0e-5_wp)

@@ -94,8 +94,8 @@ contains
     a%cell = 0.0_wp
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*sum([0.0_wp, &
-          0.0_wp, 1.0_wp]*mean_apertures(box%grid, box%solid%aperture, c))
+        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume &
+          *dot_product([0, 0, 1], mean_apertures(box%grid, box%solid%aperture, c))
         a%cell(c(1), c(2), c(3), 3) = 0.1_wp*sum(c)/dt
       end associate
     end do
