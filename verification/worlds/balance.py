@@ -30,8 +30,7 @@ def stays_still(world: World, folder: Path) -> None:
         inside = (body.points > low).all() and (body.points < high).all()
         if not inside or world.value("numerics", "solid_fraction") != "exact":
             continue
-        level = world.value("fluid", "water_level")
-        under = below_plane(body.tets, level)[0]
+        under = below_plane(body.tets, world.value("fluid", "water_level"))[0]
         lift = g * (liquid * under + gas * (body.shape.volume - under))
         error = (b.fluid_force[1:, k] - [0.0, 0.0, lift]) / (liquid * g * body.shape.volume)
         below("buoyancy less that of Archimedes, over that of the whole", error, BUOYANCY)
@@ -39,11 +38,8 @@ def stays_still(world: World, folder: Path) -> None:
 
 def lies_still(world: World, folder: Path) -> None:
     """Around free ones that lie on the floor and on each other it moves as their contacts load."""
-    below(
-        "kinetic energy of the fluid over rho g h^4",
-        motion(world, world.run(folder, ends=(0,))),
-        LOADING,
-    )
+    run = world.run(folder, ends=(0,))
+    below("kinetic energy of the fluid over rho g h^4", motion(world, run), LOADING)
 
 
 def honey() -> World:

@@ -195,15 +195,9 @@ def lying(draw: Draw) -> World:
         ("fluid", {**liquid, "water_level": level}),
         ("numerics", draw(numerics())),
         # springs have to sink; how far impulses let them sink goes with the square of this time
-        (
-            "contact",
-            {
-                **draw(contact(across)),
-                "solver": "impulses",
-                "contact_time": 3e-3 * sqrt(across / GRAVITY),
-            },
-        ),
-    ]
+        ("contact", {**draw(contact(across)), "solver": "impulses",
+                     "contact_time": 3e-3 * sqrt(across / GRAVITY)}),
+    ]  # fmt: skip
     for b in range(n):
         place, top = rounded([(b + 0.5) * length[0] / n, length[1] / 2]), 0.0
         for f in range(floors):

@@ -41,21 +41,11 @@ def pair(name: str) -> World:
             ("numerics", {"divergence_tolerance": 1e-6, **PAIRS[name]}),
             ("contact", {"contact_time": 2e-3, "solver": "springs"}),
             ("shape", {"name": "b", "kind": "hexapod", "size": 0.02, "density": 2300.0}),
-            *(
-                (
-                    "body",
-                    {
-                        "shape": "b",
-                        "fixed": place is held,
-                        "position": place[0],
-                        "axis": place[1],
-                        "angle_deg": place[2],
-                    },
-                )  # fmt: skip
-                for place in [held, *([] if name == "held" else falls)]
-            ),
+            *(("body", {"shape": "b", "fixed": place is held, "position": place[0],
+                        "axis": place[1], "angle_deg": place[2]})
+              for place in [held, *([] if name == "held" else falls)]),
         ]
-    )
+    )  # fmt: skip
 
 
 def calm() -> World:
@@ -64,15 +54,10 @@ def calm() -> World:
     thin = {"gas_density": 0.6, "gas_viscosity": 1e-3, "water_level": 2.21875875}
     thick = {"liquid_density": 3000.0, "liquid_viscosity": 7.2e-4, "gravity": [0.0, 0.0, -9.8125]}
     jacobi = {"advection": "upwind", "preconditioner": "jacobi", "divergence_tolerance": 1e-6}
-    return World(
-        [
-            ("run", {"physics": "fluid", "t_end": 0.2, "dt": 0.0675, "restart_interval": 0.0}),
-            ("grid", {"cells": [15, 12, 10], "length": [4.31109, 4.93493, 5.00002]}),
-            ("boundary", ends),
-            ("fluid", {**thin, **thick}),
-            ("numerics", jacobi),
-        ]
-    )
+    run = {"physics": "fluid", "t_end": 0.2, "dt": 0.0675, "restart_interval": 0.0}
+    grid = {"cells": [15, 12, 10], "length": [4.31109, 4.93493, 5.00002]}
+    return World([("run", run), ("grid", grid), ("boundary", ends), ("fluid", thin | thick),
+                  ("numerics", jacobi)])  # fmt: skip
 
 
 def froude(world: World, folder: Path) -> None:

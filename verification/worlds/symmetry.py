@@ -152,11 +152,8 @@ def moved(world: World, folder: Path) -> None:
     ways = [37.0 * length[0], -21.0 * length[0], 5.0 * length[0]]
     far = max(map(abs, [*ways, *world.value("grid", "origin", [0.0])]))
     digits = 2.0**-52 * far / min(h / n for h, n in zip(length, cells, strict=True))
-
-    def change(world: World, _: Array) -> World:
-        return world.shifted(ways)
-
-    same(world, folder, np.eye(3), max(ROUND_OFF, STIFF * digits), change)
+    limit = max(ROUND_OFF, STIFF * digits)
+    same(world, folder, np.eye(3), limit, lambda world, _: world.shifted(ways))
 
 
 def bodies(world: World, folder: Path) -> None:
