@@ -4,12 +4,14 @@ Nine hexapods: three fixed on the floor, six that fall one second apart to given
 with a standing wave. `write_run` takes the resting places, so tests can build any pile.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, place, quaternion_from_axis, quaternion_product
 from micstools.shapes.shape import Shape, hexapod
 
@@ -87,6 +89,27 @@ def write_run(folder: Path, motion: Motion | None = None) -> Path:
     if any(motion.origin):
         _move(folder, motion.origin)
     return folder
+
+
+def reword(folder: Path, change: Callable[[str], str]) -> Run:
+    """A synthetic run after a change of the text of its case."""
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        for name, text in list(h5["provenance"].attrs.items()):
+            if name in ("namelist", "parameters"):
+                h5["provenance"].attrs[name] = change(text)
+    return Run(folder)
+
+
+def with_bed(folder: Path, height: Callable[[Array, Array], Array]) -> Run:
+    """Gives a synthetic run a bed of a height over its plan, a little larger than the tank."""
+    x, y = np.meshgrid(np.linspace(-0.03, 0.33, 13), np.linspace(-0.02, 0.12, 8), indexing="ij")
+    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
+    n = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (k.ravel() for k in (n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        h5["bed/points"], h5["bed/triangles"] = points, triangles.astype(np.int32)
+    return reword(folder, lambda text: text + "&bed file = 'bed.txt' /\n")
 
 
 _POWERS = {

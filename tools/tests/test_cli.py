@@ -14,7 +14,6 @@ from micstools.cases import settings
 from micstools.reading.reader import BadRun, Run
 from test_height_maps import ESRI
 
-ROOT = Path(__file__).parents[2]
 CASE = """\
 ! A case with a / and a & in a remark
 &run title = 'a / b & c' t_end = 1.0 /

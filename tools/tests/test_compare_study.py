@@ -14,7 +14,7 @@ from micstools.commands.study import finer
 from micstools.reading import comparison
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import quaternion_from_axis
-from synthetic import UPRIGHT, Motion, write_run
+from synthetic import UPRIGHT, Motion, reword, write_run
 
 END = np.array([0.2, 0.05, 0.1])
 
@@ -35,10 +35,7 @@ def pair(tmp_path: Path) -> tuple[Run, Run]:
         Motion(places=[(aside, turned)], t_end=2.0, field_step=2.0, history_step=0.01),
     )
     one, two = (write_run(tmp_path / str(k), motion) for k, motion in enumerate(motions))
-    with h5py.File(two / "run.h5", "r+") as h5:
-        about = h5["provenance"].attrs
-        about["parameters"] = str(about["parameters"]) + "&contact friction = 0.3 /\n"
-    return Run(one), Run(two)
+    return Run(one), reword(two, lambda text: text + "&contact friction = 0.3 /\n")
 
 
 def test_blocks_part(pair: tuple[Run, Run]) -> None:

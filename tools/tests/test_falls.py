@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calls import MICS, needs_mics
 from micstools.pages import falls, set_up
 from micstools.reading.reader import BadRun
 from micstools.shapes.shape import cube, hexapod
 
-MICS = Path(__file__).parents[2] / "mics"
 G = 9.81
 MEAN = (3 + 6 * 2**0.5 + 4 * 3**0.5) / 13  # shadow of a cube over the thirteen directions
 
@@ -70,7 +70,7 @@ def speed(said: str, start: str) -> float:
     return float(found[1])
 
 
-@pytest.mark.skipif(not MICS.exists(), reason="needs the program")
+@needs_mics
 def test_falls_are_predicted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Height, depth and cells; free fall in air; under water the estimate."""
     said = told(f"{CUBE} 2, 2, 6.5  velocity = 0, 0, -1 /")
@@ -115,7 +115,7 @@ def test_falls_are_predicted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     )
 
 
-@pytest.mark.skipif(not MICS.exists(), reason="needs the program")
+@needs_mics
 def test_a_block_on_a_crane_does_not_fall() -> None:
     lowered = CUBE + "2, 2, 3  if_blocked = 'raise'  lowering_speed = 0.5  release = "
     said = told(lowered + "'height'  release_height = 0.2 /")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from browser import Browser
-from calls import mics_tools, until
+from calls import ROOT, mics_tools, until
 from micstools.pages import charts, html, motion, run_page, run_words, views
 from micstools.pages.charts import Curve
 from micstools.piles import maps, pile_numbers
@@ -24,7 +24,7 @@ from micstools.reading.overlap import Placed
 from micstools.reading.reader import Run
 from micstools.reading.units import LABORATORY, SITE
 from micstools.shapes import shape as shapes
-from synthetic import UPRIGHT, Motion, write_run
+from synthetic import UPRIGHT, Motion, reword, write_run
 
 TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"
 CLEAR = np.array([0.2, 0.05, 0.12])  # of the other blocks [m]
@@ -32,13 +32,8 @@ CLEAR = np.array([0.2, 0.05, 0.12])  # of the other blocks [m]
 
 def retitle(folder: Path, title: str) -> Path:
     """Gives a synthetic run another title."""
-    with h5py.File(folder / "run.h5", "r+") as h5:
-        about = h5["provenance"].attrs
-        for name in ("namelist", "parameters"):
-            about[name] = str(about[name]).replace(
-                "'synthetic'", '"' + title.replace('"', '""') + '"'
-            )
-    return folder
+    written = '"' + title.replace('"', '""') + '"'
+    return reword(folder, lambda text: text.replace("'synthetic'", written)).folder
 
 
 @pytest.fixture(scope="session")
@@ -146,9 +141,8 @@ def test_plan_is_covered_within_the_footprint(make_run) -> None:
 
 def test_make_run_makes_the_page() -> None:
     """The newcomer's one command ends with the page of its case."""
-    root = Path(__file__).parents[2]
     words = ["make", "--no-print-directory", "-n", "run", "CASE=input/dam_break.nml"]
-    done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True)
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     said = [line for line in done.stdout.splitlines() if "input/dam_break.nml" in line]
     assert said[0] == "./mics < input/dam_break.nml"
     assert said[-1].endswith(" report input/dam_break.nml")
@@ -287,13 +281,9 @@ def test_numbers_of_each_block(make_run) -> None:
 def test_what_differs_from_the_defaults(make_run) -> None:
     run = make_run(Motion(t_end=2.0, field_step=2.0))
     assert run_words.differing(run) == []
-    folder = run.folder
-    with h5py.File(folder / "run.h5", "r+") as h5:
-        about = h5["provenance"].attrs
-        about["parameters"] = (
-            str(about["parameters"]) + "&contact friction = 0.25 restitution = 0.3 /\n"
-        )
-    assert run_words.differing(Run(folder)) == [("contact.friction", "0.25", "0.6")]
+    more = "&contact friction = 0.25 restitution = 0.3 /\n"
+    run = reword(run.folder, lambda text: text + more)
+    assert run_words.differing(run) == [("contact.friction", "0.25", "0.6")]
 
 
 def test_blocks_still_to_come_have_no_curves(make_run) -> None:
@@ -322,9 +312,8 @@ def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/fluid_force"][:] = np.nan
         h5["series/liquid_volume_drift"][:] = np.nan
-        about = h5["provenance"].attrs
-        about["parameters"] = str(about["parameters"]).replace("&run", "&run physics = 'dry'")
-    text = run_page.page(Run(run.folder))
+    run = reword(run.folder, lambda text: text.replace("&run", "&run physics = 'dry'"))
+    text = run_page.page(run)
     assert (
         "and is dry" in text
         and '"water":null' in text

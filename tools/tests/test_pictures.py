@@ -7,7 +7,6 @@ import signal
 import struct
 import subprocess
 import sys
-import time
 import warnings
 import weakref
 from collections.abc import Iterator
@@ -21,7 +20,7 @@ import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from calls import mics_tools
+from calls import ROOT, mics_tools, python, until
 from micstools.pictures import exports, labels, movie, plots, reel, scene
 from micstools.pictures.movie import Film
 from micstools.reading.reader import BadRun, Run
@@ -29,7 +28,6 @@ from micstools.shapes.shape import hexapod
 from synthetic import UPRIGHT, Motion, write_run
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())
-TOOLS = Path(__file__).parents[1]
 
 
 def colours(path: Path) -> np.ndarray:
@@ -42,8 +40,8 @@ def test_a_picture_shows_blocks_and_water(loose_pile: Run, tmp_path: Path, view:
     full = scene.picture(loose_pile, 8.0, view, tmp_path / "a.png", scene.Style(width=300))
     rgb = colours(full)
     reddish = (rgb[:, 0] > rgb[:, 1] + 60) & (rgb[:, 0] > rgb[:, 2] + 40)
-    bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
     assert reddish.mean() > 0.01
+    bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
     assert (bluish.mean() < 0.1) if view == "top" else (bluish.mean() > 0.2)  # water veils the pile
 
 
@@ -217,15 +215,13 @@ def test_contact_sheet_places_all(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("script", ["plot_pile", "plot_history", "plot_shape", "check_pile"])
 def test_scripts_explain_themselves_and_are_short(script: str) -> None:
-    path = TOOLS / f"{script}.py"
+    path = ROOT / "tools" / f"{script}.py"
     assert len(path.read_text().splitlines()) < 40
-    shown = subprocess.run([sys.executable, path, "--help"], capture_output=True, check=True)
-    assert b"usage" in shown.stdout
+    assert "usage" in python(path, "--help", check=True).stdout
 
 
 def test_check_pile_prints_the_findings(loose_pile: Run) -> None:
-    command = [sys.executable, TOOLS / "check_pile.py", loose_pile.folder]
-    shown = subprocess.run(command, capture_output=True, check=True, text=True)
+    shown = python(ROOT / "tools" / "check_pile.py", loose_pile.folder, check=True)
     assert "pattern A" in shown.stdout
 
 
@@ -263,6 +259,16 @@ def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
         assert line["fixed"] == str(int(k < 3))
 
 
+Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of the axes of glTF
+
+
+def box_of(run: Run, row: int, blocks: int = 9, turn: np.ndarray | None = None) -> np.ndarray:
+    """Lower and upper corner (2, 3) [m] of the first blocks at a row, in turned axes."""
+    points = np.concatenate([run.points(k, row) for k in range(blocks)])
+    points = points if turn is None else points @ turn
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
 @pytest.mark.parametrize("kind", ["stl", "obj"])
 def test_the_pile_is_closed_and_each_block_has_its_name(
     loose_pile: Run, tmp_path: Path, kind: str
@@ -277,8 +283,7 @@ def test_the_pile_is_closed_and_each_block_has_its_name(
         mesh = trimesh.load(path, force="mesh")
     mesh.merge_vertices()
     assert mesh.is_watertight and mesh.volume == pytest.approx(6 * 56e-6, rel=1e-5)
-    points = np.concatenate([loose_pile.points(k, row) for k in range(6)])
-    assert mesh.bounds == pytest.approx(np.array([points.min(axis=0), points.max(axis=0)]))
+    assert mesh.bounds == pytest.approx(box_of(loose_pile, row, 6))
 
 
 def parts_of(path: Path) -> tuple[dict, bytes]:
@@ -324,10 +329,7 @@ def test_the_film_moves_each_block(loose_pile: Run, tmp_path: Path) -> None:
 def test_other_programs_read_the_film(loose_pile: Run, tmp_path: Path) -> None:
     """As trimesh does: y is up there, and z runs to the viewer."""
     found = trimesh.load(exports.to_glb(loose_pile, 0, tmp_path))
-    points = np.concatenate([loose_pile.points(k, 0) for k in range(9)])
-    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
-    wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
-    assert found.bounds == pytest.approx(wanted, abs=1e-6)
+    assert found.bounds == pytest.approx(box_of(loose_pile, 0, turn=Y_UP), abs=1e-6)
 
 
 def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
@@ -336,10 +338,7 @@ def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
     run = Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=corner)))
     path = exports.to_glb(run, 0, tmp_path)
     assert parts_of(path)[0]["nodes"][-1]["translation"] == [354200.0, -12.0, -5621080.0]
-    points = np.concatenate([run.points(k, 0) for k in range(9)])
-    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
-    wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
-    assert np.abs(trimesh.load(path).bounds - wanted).max() < 1e-5
+    assert np.abs(trimesh.load(path).bounds - box_of(run, 0, turn=Y_UP)).max() < 1e-5
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj"])
@@ -350,8 +349,7 @@ def test_a_pile_in_a_survey_counts_from_a_corner(tmp_path: Path, kind: str, caps
     assert "0, 0, 0 of stl and obj is 354200, 5621080, -12 m of the run" in capsys.readouterr().out
     told = json.loads((tmp_path / "origin.json").read_text())
     assert told["origin"] == [354200, 5621080, -12]
-    points = np.concatenate([run.points(k, len(run.bodies.time) - 1) for k in range(9)])
-    wanted = np.array([points.min(axis=0), points.max(axis=0)]) - told["origin"]
+    wanted = box_of(run, len(run.bodies.time) - 1) - told["origin"]
     found = trimesh.load(tmp_path / f"pile.{kind}", force="mesh").bounds.astype(np.float32)
     assert np.abs(found - wanted).max() < 1e-6
 
@@ -382,8 +380,6 @@ def test_each_shape_has_its_file(loose_pile: Run, tmp_path: Path) -> None:
     mesh.merge_vertices()
     assert mesh.is_watertight and mesh.volume == pytest.approx(56e-6, rel=1e-5)
 
-
-ROOT = Path(__file__).parents[2]
 
 has_ffmpeg = pytest.mark.skipif(not movie.encoder(), reason=movie.NO_ENCODER)
 has_ffprobe = pytest.mark.skipif(not movie.shutil.which("ffprobe"), reason="no ffprobe here")
@@ -513,10 +509,7 @@ def test_a_stopped_film_leaves_nothing(loose_pile: Run, tmp_path: Path) -> None:
     ) as running:
         assert running.stderr
         running.stderr.readline()  # the first pictures are told
-        for _ in range(100):
-            if list(tmp_path.iterdir()):
-                break
-            time.sleep(0.05)
+        until(lambda: list(tmp_path.iterdir()), 5)
         running.send_signal(signal.SIGTERM)
         assert running.wait(30) == 143
     assert list(tmp_path.iterdir()) == []

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
-from calls import mics_tools
+from calls import ROOT, mics_tools
 from micstools.piles import handover, layer
 from micstools.reading import places, units
 from micstools.reading.overlap import Placed
@@ -22,7 +22,7 @@ from micstools.reading.reader import Run
 from micstools.shapes import height_maps
 from micstools.shapes import shape as shapes
 from micstools.shapes.geometry import Array, quaternion_from_axis, quaternion_product
-from synthetic import UPRIGHT, Motion, write_run
+from synthetic import UPRIGHT, Motion, with_bed, write_run
 from test_pile_ensemble import write_ensemble
 
 EDGE, HALF = 0.02, 0.01
@@ -106,10 +106,8 @@ def test_units_that_move_or_are_to_come(tmp_path: Path) -> None:
 def test_a_bed_is_a_contact(tmp_path: Path) -> None:
     """Beside the floor and the other cube."""
     run = write(tmp_path / "run")
-    corners = np.array([(x, y, 0.0) for x in (0.0, 0.3) for y in (0.0, 0.1)])
-    with h5py.File(run.folder / "run.h5", "r+") as h5:
-        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 2, 1), (1, 2, 3)])
-    low, high, *_ = places.places(Run(run.folder))[3:]
+    run = with_bed(run.folder, lambda x, y: 0 * x)
+    low, high, *_ = places.places(run)[3:]
     assert (low.contacts, low.neighbours, high.contacts) == (3, 1, 1)
 
 
@@ -261,9 +259,7 @@ def test_a_name_is_no_formula(tmp_path: Path) -> None:
 
 def test_the_reef_lies_in_its_system() -> None:
     """In UTM zone 32, whose northings have seven digits."""
-    rows = csv.DictReader(
-        (Path(__file__).parents[2] / "input/reef.csv").open(), skipinitialspace=True
-    )
+    rows = csv.DictReader((ROOT / "input/reef.csv").open(), skipinitialspace=True)
     assert all(5.5e6 < float(row["y"]) < 5.7e6 and 3e5 < float(row["x"]) < 4e5 for row in rows)
 
 
@@ -417,10 +413,8 @@ def test_squares_as_fine_as_wanted(pack: Run) -> None:
 def test_a_bed_is_measured_by_the_ball_too(tmp_path: Path) -> None:
     """The same pack on a slope of 1:2 is as thick; a ball rests higher on both."""
     run = cubes(tmp_path, two_layers(0.01))
-    corners = np.array([(x, y, 0.01) for x in (0.0, 0.3) for y in (0.0, 0.1)])
-    with h5py.File(run.folder / "run.h5", "r+") as h5:
-        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 2, 1), (1, 2, 3)])
-    maps, found = layer.of_run(Run(run.folder), layers=2, area=CELL)  # type: ignore[misc]
+    run = with_bed(run.folder, lambda x, y: 0 * x + 0.01)
+    maps, found = layer.of_run(run, layers=2, area=CELL)  # type: ignore[misc]
     assert found.mean.coefficient == pytest.approx(1.10, rel=0.02)
     assert found.ball.thickness == pytest.approx(ball_thickness(), rel=0.02)
     slope = np.tile(0.5 * EDGE / 24 * np.arange(200), (60, 1))
@@ -431,10 +425,8 @@ def test_a_bed_is_measured_by_the_ball_too(tmp_path: Path) -> None:
 def test_a_bare_slope_has_no_layer(tmp_path: Path) -> None:
     """The ball rests above a slope as above what lies on it."""
     run = cubes(tmp_path, [(0.15, 0.05, 0.15)])
-    corners = np.array([(x, y, 0.4 * x) for x in (0.0, 0.3) for y in (0.0, 0.1)])
-    with h5py.File(run.folder / "run.h5", "r+") as h5:
-        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 2, 1), (1, 2, 3)])
-    maps, found = layer.of_run(Run(run.folder), area=((0.02, 0.02), (0.10, 0.08)))  # type: ignore[misc]
+    run = with_bed(run.folder, lambda x, y: 0.4 * x)
+    maps, found = layer.of_run(run, area=((0.02, 0.02), (0.10, 0.08)))  # type: ignore[misc]
     assert found.ball.thickness == pytest.approx(0.0, abs=1e-12)
     assert found.mean.thickness == pytest.approx(0.0, abs=1e-12) and found.units == 0
     assert (maps.bed_ball - maps.bed)[10:20, 10:20].min() > 0.05 * RADIUS
@@ -445,10 +437,8 @@ def test_the_outline_of_a_flat_unit(tmp_path: Path) -> None:
     `THIN`."""
     out, high = 0.1 * EDGE, 0.03
     run = cubes(tmp_path, [(0.15, 0.05, high + out - EDGE / 2)])
-    corners = np.array([(x, y, high) for x in (0.0, 0.3) for y in (0.0, 0.1)])
-    with h5py.File(run.folder / "run.h5", "r+") as h5:
-        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 2, 1), (1, 2, 3)])
-    found = layer.maps(Run(run.folder), EDGE, step=EDGE / 100)
+    run = with_bed(run.folder, lambda x, y: 0 * x + high)
+    found = layer.maps(run, EDGE, step=EDGE / 100)
     width = np.sqrt(RADIUS**2 - (RADIUS - out + layer.THIN * EDGE) ** 2)
     plan = EDGE**2 + 4 * EDGE * width + np.pi * width**2
     assert found.raised.sum() * found.step**2 == pytest.approx(plan, rel=0.03)

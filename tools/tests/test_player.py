@@ -3,11 +3,9 @@ paths, paces, and the speed of the water."""
 
 import base64
 import io
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,24 +13,9 @@ from PIL import Image
 from browser import Browser
 from micstools.pages import motion, parts, run_page
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import Array
-from synthetic import UPRIGHT, Motion, write_run
+from synthetic import UPRIGHT, Motion, with_bed, write_run
 
 FLAT = ("front", "side", "top")
-
-
-def with_bed(folder: Path, height: Callable[[Array, Array], Array]) -> Run:
-    """Gives a synthetic run a bed of a height over its plan, a little larger than the tank."""
-    x, y = np.meshgrid(np.linspace(-0.03, 0.33, 13), np.linspace(-0.02, 0.12, 8), indexing="ij")
-    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
-    n = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (k.ravel() for k in (n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]))
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    with h5py.File(folder / "run.h5", "r+") as h5:
-        h5["bed/points"], h5["bed/triangles"] = points, triangles.astype(np.int32)
-        about = h5["provenance"].attrs
-        about["parameters"] = str(about["parameters"]) + "&bed file = 'bed.txt' /\n"
-    return Run(folder)
 
 
 def save(run: Run, path: Path, north: float | None = None) -> Path:

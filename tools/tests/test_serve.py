@@ -89,6 +89,12 @@ def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
     return found
 
 
+def post(site: Site, path: str, **body: Any) -> tuple[int, dict[str, Any]]:
+    """Status and data of the answer to what a window of the site sends."""
+    status, _, text = request(site, path, method="POST", body=body, **{TOKEN: site.token})
+    return status, json.loads(text) if text.startswith("{") else {}
+
+
 @pytest.fixture
 def run_site(tmp_path: Path) -> Iterator[Site]:
     site = watch.site_of(write_run(tmp_path / "run", Motion(t_end=1.0)))
@@ -113,7 +119,7 @@ def test_nobody_else_is_answered(run_site: Site) -> None:
     for headers in ({}, {TOKEN: "x"}, {TOKEN: site.session}):
         assert request(site, "/stop", **stop, **headers)[0] == 403, headers
     assert request(site, "/stop", **stop, **{TOKEN: site.token}, Host="evil.example")[0] == 421
-    assert request(site, "/stop", **stop, **{TOKEN: site.token})[0] == 422  # no run goes on
+    assert post(site, "/stop", how="restart")[0] == 422  # no run goes on
     assert not (site_folder(site) / "stop").exists()
     assert request(site, "/stop")[0] == 405
 
@@ -468,10 +474,7 @@ def test_an_ensemble_is_watched(tmp_path: Path, browser: Browser) -> None:
         browser.run("document.querySelector('[data-run=\"2\"]').click()")
         until(lambda: browser.run("live.player.stage.scene && true"))
         assert browser.run("live.player.stage.scene.bodies.length") == 4
-        posted = request(
-            site, "/stop", method="POST", body={"how": "restart"}, **{TOKEN: site.token}
-        )
-        assert posted[0] == 200 and (result / "stop").exists()
+        assert post(site, "/stop", how="restart")[0] == 200 and (result / "stop").exists()
         assert not (folder / "0002" / "result" / "stop").exists()
         assert outside(browser, address) == []
 
@@ -490,9 +493,16 @@ def test_a_page_to_watch_fits(run_site: Site, browser: Browser, width: int, dark
 
 
 @pytest.fixture
-def draft(tmp_path: Path) -> Draft:
+def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A file of two cubes, in the folder in which the tests of a studio run."""
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "case.nml").write_text(CASE)
-    return Draft(tmp_path / "case.nml", MICS)
+    return tmp_path / "case.nml"
+
+
+@pytest.fixture
+def draft(case: Path) -> Draft:
+    return Draft(case, MICS)
 
 
 @needs_mics
@@ -552,53 +562,43 @@ def test_a_case_of_somebody_else_is_not_overwritten(draft: Draft) -> None:
 
 
 @needs_mics
-def test_one_run_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_run_at_a_time(case: Path) -> None:
     """Two windows ask at once; a studio that is opened anew finds the run."""
-    monkeypatch.chdir(tmp_path)
-    case = tmp_path / "case.nml"
-    case.write_text(CASE)
     site, again = studio.site_of(case, MICS), studio.site_of(case, MICS)
+    lock = case.parent / "mics-here" / "run.lock"
 
     def run(site: Site) -> int:
-        return request(site, "/run", method="POST", body={"number": 0}, **{TOKEN: site.token})[0]
+        return post(site, "/run", number=0)[0]
 
     with serving(site), ThreadPoolExecutor(2) as windows:
         assert request(site, "/watch")[:1] == (303,)
         assert request(site, "/watch")[1]["Location"] == "/"
         assert sorted(windows.map(run, (site, site))) == [200, 422]
-        until(lambda: living.holder(tmp_path / "mics-here" / "run.lock"))
+        until(lambda: living.holder(lock))
     with serving(again):
         assert request(again, "/watch")[0] == 200 and run(again) == 422
-        body = {"how": "now"}
-        assert request(again, "/stop", method="POST", body=body, **{TOKEN: again.token})[0] == 200
-        until(lambda: living.holder(tmp_path / "mics-here" / "run.lock") is None)
+        assert post(again, "/stop", how="now")[0] == 200
+        until(lambda: living.holder(lock) is None)
 
 
 @needs_mics
-def test_a_change_of_an_older_text_is_not_made(tmp_path: Path) -> None:
+def test_a_change_of_an_older_text_is_not_made(case: Path) -> None:
     """Whoever sends it gets the newest one, and nothing is lost."""
-    case = tmp_path / "case.nml"
-    case.write_text(CASE)
     site = studio.site_of(case, MICS)
-
-    def post(path: str, **body: Any) -> tuple[int, dict[str, Any]]:
-        status, _, text = request(site, path, method="POST", body=body, **{TOKEN: site.token})
-        return status, json.loads(text) if text.startswith("{") else {}
-
     with serving(site):
-        status, state = post("/edit", op="copy", group="drop", n=0, number=0)
+        status, state = post(site, "/edit", op="copy", group="drop", n=0, number=0)
         assert status == 200 and state["number"] == 1
         late = {"group": "drop", "n": 0, "variable": "count", "value": "7"}
         for number in (0, 2, None, "1"):
-            status, said = post("/edit", op="set", number=number, **late)
+            status, said = post(site, "/edit", op="set", number=number, **late)
             assert (status, said["state"]) == (409, state)
             for path in ("/save", "/run"):
-                assert post(path, number=number)[0] == 409
+                assert post(site, path, number=number)[0] == 409
         assert case.read_text() == CASE
-        assert post("/edit", op="set", number=1, **late)[1]["number"] == 2
-        assert post("/edit", op="set", number=2, **late | {"n": "x"})[0] == 400
-        assert post("/edit", op="text", number=2, text="a\0b")[0] == 422
-        assert post("/save", number=2)[0] == 200 and "count = 7" in case.read_text()
+        assert post(site, "/edit", op="set", number=1, **late)[1]["number"] == 2
+        assert post(site, "/edit", op="set", number=2, **late | {"n": "x"})[0] == 400
+        assert post(site, "/edit", op="text", number=2, text="a\0b")[0] == 422
+        assert post(site, "/save", number=2)[0] == 200 and "count = 7" in case.read_text()
 
 
 def test_what_is_typed_has_the_type_of_its_variable() -> None:
@@ -625,13 +625,9 @@ VERDICT = "document.getElementById('verdict').textContent"
 
 
 @needs_mics
-def test_a_case_is_edited_run_stopped_and_reported(
-    tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_case_is_edited_run_stopped_and_reported(case: Path, browser: Browser) -> None:
     """Typed, dragged, wrong told, saved, run, watched, stopped, reported."""
-    monkeypatch.chdir(tmp_path)
-    case = tmp_path / "case.nml"
-    case.write_text(CASE)
+    folder = case.parent / "mics-here"
     with serving(studio.site_of(case, MICS)) as address:
         browser.visit(address, 1200, 900)
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
@@ -669,10 +665,10 @@ def test_a_case_is_edited_run_stopped_and_reported(
         assert "size = 0.06" in case.read_text() and case.read_text().startswith("! a remark")
         browser.run("document.querySelector('[data-stop=restart]').click()")
         until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
-        assert (tmp_path / "mics-here" / "restart-a.h5").is_file()
-        stopped = Run(tmp_path / "mics-here").series.time[-1]
+        assert (folder / "restart-a.h5").is_file()
+        stopped = Run(folder).series.time[-1]
         browser.run("document.getElementById('go-on').click()")
-        until(lambda: Run(tmp_path / "mics-here").series.time[-1] > stopped)
+        until(lambda: Run(folder).series.time[-1] > stopped)
         until(lambda: "Running at t" in browser.run("document.body.innerText"))
         browser.run("document.querySelector('[data-stop=restart]').click()")
         until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
@@ -681,15 +677,13 @@ def test_a_case_is_edited_run_stopped_and_reported(
         until(lambda: browser.run("location.pathname") == "/report")
         until(lambda: browser.run("typeof runPlayer !== 'undefined' && true"))
         assert browser.run("document.querySelector('h1').textContent") == "Two cubes"
-        assert (tmp_path / "mics-here" / "report.html").is_file()
+        assert (folder / "report.html").is_file()
         assert outside(browser, address) == []
 
 
 @needs_mics
-def test_two_windows_lose_nothing(tmp_path: Path, browser: Browser) -> None:
+def test_two_windows_lose_nothing(case: Path, tmp_path: Path, browser: Browser) -> None:
     """What was typed just before Save is saved; over a change of another window one chooses."""
-    case = tmp_path / "case.nml"
-    case.write_text(CASE)
     site = studio.site_of(case, MICS)
 
     def saved(window: Browser, text: str) -> None:

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import IO
 
 from micstools.cases import program, settings
 from micstools.ensembles import (
@@ -100,10 +100,6 @@ class _Live:
             print()
 
 
-def _terminated(signum: int, _frame: object) -> NoReturn:
-    raise KeyboardInterrupt(signum)
-
-
 def work(given: argparse.Namespace) -> int:
     queue = ensemble_queue.parse(given.cluster) if given.cluster else None
     if queue and given.slurm is not None:
@@ -177,7 +173,7 @@ def _write_slurm(plan: Plan, waiting: list[Member], path: Path, options: list[st
 
 def _compute(plan: Plan, table: dict[Member, State], waiting: list[Member], engine: Engine) -> int:
     live = _Live(plan, table)
-    signal.signal(signal.SIGTERM, _terminated)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     stopped = False
     try:
         if waiting:

@@ -2,7 +2,7 @@
 
 import argparse
 import signal
-from typing import NoReturn
+import sys
 
 from micstools import command
 from micstools.pictures import movie, scene
@@ -17,12 +17,8 @@ def work(given: argparse.Namespace) -> int:
     path = given.out or run.folder / f"{given.view}.mp4"
     movie.require(path)
     film = movie.Film(given.view, given.begin, given.until, given.slow, given.rate, given.width)
-    signal.signal(signal.SIGTERM, _terminated)
+    # As Ctrl-C does it: nothing unfinished is left.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     print(f"{len(film.times(run))} pictures", flush=True)
     print(movie.write(run, film, path))
     return 0
-
-
-def _terminated(_signum: int, _frame: object) -> NoReturn:
-    """End as after Ctrl-C, so that nothing unfinished is left."""
-    raise SystemExit(128 + signal.SIGTERM)

@@ -122,7 +122,7 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
         alike.setdefault(colours[k], []).append(body)
     for colour, bodies in alike.items():
         faces = [triangles_of(body.points, body.shape.triangles) for body in bodies]
-        edges = [_edges(body.points, body.shape) for body in bodies]
+        edges = [_lines(body.points, body.shape.edges) for body in bodies]
         _add_solid(plotter, vtk_data.joined(faces), vtk_data.joined(edges), colour)
     add_tank(plotter, run.grid.low, run.grid.high)
     add_bed(plotter, run)
@@ -237,7 +237,7 @@ def add_block(plotter: Plotter, points: Array, shape: Shape, colour: str) -> tup
     """Add the faces and the edges of a block whose corners are at `points` (n, 3) [m]; returns
     both actors."""
     faces = triangles_of(points, shape.triangles)
-    return _add_solid(plotter, faces, _edges(points, shape), colour)
+    return _add_solid(plotter, faces, _lines(points, shape.edges), colour)
 
 
 def _add_solid(plotter: Plotter, faces: Any, edges: Any, colour: str) -> tuple[Any, Any]:
@@ -245,10 +245,6 @@ def _add_solid(plotter: Plotter, faces: Any, edges: Any, colour: str) -> tuple[A
         faces, color=colour, smooth_shading=False, ambient=0.35, diffuse=0.75, specular=0.1
     )
     return surface, plotter.add_mesh(edges, color="#303030", line_width=1.5)
-
-
-def _edges(points: Array, shape: Shape) -> Any:
-    return _lines(points, shape.edges)
 
 
 def _lines(points: Array, edges: IntArray) -> Any:
@@ -451,7 +447,7 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
             plotter.add_mesh(
                 triangles_of(shape.points, shape.triangles), color="#c9a66b", ambient=0.25
             )
-            plotter.add_mesh(_edges(shape.points, shape), color="#303030", line_width=2)
+            plotter.add_mesh(_lines(shape.points, shape.edges), color="#303030", line_width=2)
         elif column == 1:
             ends = np.sort(shape.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]], axis=2)
             wires = np.unique(ends.reshape(-1, 2), axis=0)
