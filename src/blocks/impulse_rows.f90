@@ -18,20 +18,24 @@ module impulse_rows_m
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
 
-  !> One contact point: its frame, the masses it works on, and its impulse, on counterpart b.
+  !> One contact point: its frame, the masses it works on, and its impulse, on counterpart b. What
+  !! tells that it is idle comes first, for most are.
   type :: row_t
-    real(wp) :: n(3) = 0.0_wp, e1(3) = 0.0_wp, e2(3) = 0.0_wp  !! normal from a to b, tangents [-]
+    real(wp) :: impulse(3) = 0.0_wp                   !! of a sub-sweep along n, e1, e2 [N s]
+    real(wp) :: gap = 0.0_wp                          !! now [m]
+    real(wp) :: n(3) = 0.0_wp                         !! normal from a to b [-]
+    real(wp) :: lever_a(3) = 0.0_wp, lever_b(3) = 0.0_wp  !! arm x n [m]
+    real(wp) :: e1(3) = 0.0_wp, e2(3) = 0.0_wp        !! tangents [-]
     real(wp) :: arm_a(3) = 0.0_wp, arm_b(3) = 0.0_wp  !! from the centres to the contact [m]
     real(wp) :: response(3) = 0.0_wp                  !! K n: velocity by a unit push [1/kg]
     real(wp) :: mass = 0.0_wp                         !! 1/(n.K n) [kg]
     real(wp) :: mass_11 = 0.0_wp, mass_12 = 0.0_wp, mass_22 = 0.0_wp  !! of the tangents [kg]
     real(wp) :: mass_slip = 0.0_wp                    !! one over the largest K along the tangents
-    real(wp) :: gap = 0.0_wp                          !! at the start of the step [m]
+    real(wp) :: gap_start = 0.0_wp                    !! when the step began [m]
     real(wp) :: friction = 0.0_wp                     !! [-]
     real(wp) :: rate = 0.0_wp                         !! at which an overlap is taken back [1/s]
     real(wp) :: soft = 1.0_wp, keep = 0.0_wp          !! share of the mass, of the impulse [-]
     real(wp) :: stretch(2) = 0.0_wp                   !! tangential way remembered [m]
-    real(wp) :: impulse(3) = 0.0_wp                   !! of a sub-sweep along n, e1, e2 [N s]
     real(wp) :: way(3) = 0.0_wp                       !! of b past a since the step began [m]
   end type row_t
 
@@ -71,7 +75,7 @@ module impulse_rows_m
     real(wp) :: h = 0.0_wp, push_max = 0.0_wp     !! sub-sweep, largest speed of opening [s], [m/s]
     integer :: number = 0                         !! of the sweeps over an impact, 0: over all pairs
     real(wp) :: small = 0.0_wp                    !! change of a velocity that ends them [m/s]
-    logical, allocatable :: reached(:)            !! (n_pairs)
+    logical, allocatable :: reached(:), directed(:)   !! (n_pairs) by them, has a direction now
     real(wp) :: square = 0.0_wp                   !! of the last change of the impulses
     real(wp), allocatable :: kept(:, :), along(:, :)       !! (3, n) [N s]
     real(wp), allocatable :: inverse_mass(:)      !! (counterparts) 0: does not yield [1/kg]
@@ -134,7 +138,9 @@ contains
         rows%point(r) = t
         call begin_pair(point%a, point%b, rows)
         rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
-          gap=-point%depth, friction=merge(law%wall_friction, law%friction, point%b < 0))
+          gap=-point%depth, gap_start=-point%depth, &
+          lever_a=cross(point%arm_a, point%normal), lever_b=cross(point%arm_b, point%normal), &
+          friction=merge(law%wall_friction, law%friction, point%b < 0))
         call weigh(point%a, point%b, rows, rows%row(r))
         call recall(point, h, memory, m, rows%row(r))
         associate (row => rows%row(r))
@@ -213,6 +219,7 @@ contains
     call ensure_capacity(n, rows%colour)
     call ensure_capacity(n, rows%order)
     call ensure_capacity(n, rows%reached)
+    call ensure_capacity(n, rows%directed)
     call ensure_capacity(n, rows%turn)
   end subroutine reserve_rows
 

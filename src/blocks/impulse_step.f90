@@ -265,7 +265,7 @@ contains
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
           do r = first, last
-            report%overlap_max = max(report%overlap_max, -rows%row(r)%gap)
+            report%overlap_max = max(report%overlap_max, -rows%row(r)%gap_start)
             if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
               abs(rows%closing(r))*step/contacts%detected%points%item(rows%point(r))%length)
           end do

@@ -31,7 +31,7 @@ module impulse_sweeps_m
   public :: solve_rows
 
   integer, parameter :: n_correct = 2           !! sweeps with bias; one lets the stack creep
-  integer, parameter :: n_finish = 200          !! sweeps over an impact, at most
+  integer, parameter :: n_finish = 80           !! sweeps over an impact, at most
   integer, parameter :: n_open = 6              !! sweeps after what it returned
   integer, parameter :: n_hard = 400            !! sweeps where masses differ much, at most
   real(wp), parameter :: max_turn = 0.02_wp     !! by contact in the rest of a step, times e [rad]
@@ -40,7 +40,8 @@ module impulse_sweeps_m
   real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
   real(wp), parameter :: small = 0.03_wp        !! change that ends an impact, over slow hits [-]
-  real(wp), parameter :: residual = 1.0e-7_wp   !! the same over the fastest or first change
+  real(wp), parameter :: fast_share = 2.0e-3_wp !! the same, over the fastest hit [-]
+  real(wp), parameter :: residual = 1.0e-7_wp   !! where masses differ much, over the first change
 
 contains
 
@@ -182,6 +183,7 @@ contains
       do r = rows%first(k), rows%first(k + 1) - 1
         associate (row => rows%row(r))
           row%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), row%arm_a, row%arm_b)
+          row%gap = row%gap_start + dot_product(row%n, row%way)
         end associate
       end do
     end do
@@ -265,12 +267,13 @@ contains
     integer, intent(in) :: k
     type(rows_t), intent(inout) :: rows
     real(wp), intent(inout) :: change
-    real(wp) :: va(6), vb(6), p(3), total(3), half(3), arm_a(3), arm_b(3), mass, most, h
+    real(wp) :: va(6), vb(6), v(3), p(3), total(3), half(3), arm_a(3), arm_b(3), mass, most, h
     integer :: r, from, to, way
 
     associate (a => rows%a(k), b => rows%b(k))
       if (.not. is_live(k, rows)) return
       rows%reached(k) = .true.
+      rows%directed(k) = .true.
       from = merge(rows%first(k + 1) - 1, rows%first(k), backward)
       to = merge(rows%first(k), rows%first(k + 1) - 1, backward)
       way = merge(-1, 1, backward)
@@ -278,19 +281,26 @@ contains
       vb = rows%v(:, b)
       mass = rows%inverse_mass(a) + rows%inverse_mass(b)
       half = half_way_past(k, rows)
+      v = vb(1:3) - va(1:3) + cross(va(4:6) + vb(4:6), half)
       total = 0.0_wp
       most = 0.0_wp
       do r = from, to, way
         associate (row => rows%row(r))
+          h = rows%h   ! what pushed in an impact counts as closed
+          if (row%impulse(1) > 0.0_wp) then
+            if (rows%number > 0) h = huge(h)
+          else if (.not. any(abs(row%impulse) > 0.0_wp)) then   ! idle?
+            if (dot_product(row%n, v) + dot_product(row%lever_b, vb(4:6)) &
+                - dot_product(row%lever_a, va(4:6)) >= opening(h, rows%push_max, bias, row)) cycle
+          end if
           arm_a = row%arm_a - half
           arm_b = row%arm_b + half
-          h = rows%h   ! what pushed in an impact counts as closed
-          if (rows%number > 0 .and. row%impulse(1) > 0.0_wp) h = huge(h)
           call correct(h, rows%push_max, bias, past(va, vb, arm_a, arm_b), row, p)
           rows%largest(r) = max(rows%largest(r), row%impulse(1))
           if (.not. any(abs(p) > 0.0_wp)) cycle
           va = va - by_impulse(a, arm_a, p, rows)
           vb = vb + by_impulse(b, arm_b, p, rows)
+          v = vb(1:3) - va(1:3) + cross(va(4:6) + vb(4:6), half)
         end associate
         total = total + p
         most = max(most, (abs(p(1)) + abs(p(2)) + abs(p(3)))*mass)
@@ -303,6 +313,20 @@ contains
     end associate
   end subroutine solve_pair
 
+  !> Speed with which a row is to open at least: a gap may close in a sub-sweep [m/s].
+  pure real(wp) function opening(h, push_max, bias, row)
+    real(wp), intent(in) :: h, push_max   !! [s], [m/s]
+    logical, intent(in) :: bias           !! overlaps open; else their velocity is taken away
+    type(row_t), intent(in) :: row
+
+    opening = 0.0_wp
+    if (row%gap > 0.0_wp) then
+      opening = -row%gap/h
+    else if (bias) then
+      opening = min(-row%rate*row%gap, push_max)
+    end if
+  end function opening
+
   !> Correct the impulse of one row: along the normal, then friction with the velocity after that.
   pure subroutine correct(h, push_max, bias, v, row, p)
     real(wp), intent(in) :: h, push_max   !! [s], [m/s]
@@ -310,21 +334,15 @@ contains
     real(wp), intent(in) :: v(3)          !! of b past a [m/s]
     type(row_t), intent(inout) :: row
     real(wp), intent(out) :: p(3)         !! change of the impulse on b [N s]
-    real(wp) :: gap, v_n, rate, normal, slip(3), before(3)
+    real(wp) :: rate, normal, slip(3), before(3)
 
-    gap = row%gap + dot_product(row%n, row%way)
-    v_n = dot_product(row%n, v)
     rate = 0.0_wp
-    if (gap > 0.0_wp) then
-      normal = row%impulse(1) - row%mass*(v_n + gap/h)
-    else if (bias) then
+    normal = row%mass*(dot_product(row%n, v) - opening(h, push_max, bias, row))
+    if (bias .and. row%gap <= 0.0_wp) then
       rate = row%rate
-      normal = row%impulse(1) - row%soft*row%mass*(v_n + max(rate*gap, -push_max)) &
-        - row%keep*row%impulse(1)
-    else
-      normal = row%impulse(1) - row%mass*v_n
+      normal = row%soft*normal + row%keep*row%impulse(1)
     end if
-    normal = max(0.0_wp, normal)
+    normal = max(0.0_wp, row%impulse(1) - normal)
     p = (normal - row%impulse(1))*row%n
     before = row%impulse
     row%impulse(1) = normal
@@ -414,6 +432,7 @@ contains
     integer :: r
 
     rows%reached(:rows%n_pairs) = .false.
+    rows%directed(:rows%n_pairs) = .false.
     do r = 1, rows%n
       rows%kept(:, r) = rows%row(r)%impulse
       rows%along(:, r) = 0.0_wp
@@ -439,12 +458,13 @@ contains
     if (square < rows%square) beta = square/rows%square
     rows%square = square
     do k = 1, rows%n_pairs
-      if (.not. rows%reached(k)) cycle
+      if (.not. rows%directed(k)) cycle
+      rows%directed(k) = is_live(k, rows)
       do r = rows%first(k), rows%first(k + 1) - 1
         associate (row => rows%row(r), along => rows%along(:, r))
           step = row%impulse - rows%kept(:, r)
           along = beta*along
-          if (.not. is_live(k, rows)) along = 0.0_wp
+          if (.not. rows%directed(k)) along = 0.0_wp
           row%impulse = row%impulse + along
           rows%kept(:, r) = row%impulse
           if (any(abs(along) > 0.0_wp)) call push(in_space(along, row), k, r, rows)
@@ -466,7 +486,7 @@ contains
 
     call mark_hits(slowest, rows, speed)
     if (.not. speed > 0.0_wp) return
-    rows%small = max(small*slowest, residual*speed)
+    rows%small = max(small*slowest, fast_share*speed)
     do r = 1, rows%n
       rows%returned(:, r) = rows%row(r)%impulse
       rows%row(r)%impulse = rows%total(:, r)
@@ -547,7 +567,7 @@ contains
           length = sqrt(whole(2)**2 + whole(3)**2)
           bound = row%friction*whole(1)
           if (length > bound) back(2:3) = whole(2:3)*(bound/length) - total(2:3)
-        else if (total(1) > 0.0_wp .or. row%gap + dot_product(row%n, row%way) <= 0.0_wp) then
+        else if (total(1) > 0.0_wp .or. row%gap <= 0.0_wp) then
           back(1) = max(least, back(1) - row%mass*dot_product(row%n, past(rows%v(:, a), &
             rows%v(:, b), row%arm_a - half, row%arm_b + half)))
         end if
