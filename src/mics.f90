@@ -23,14 +23,14 @@ program mics
   use case_plan_m, only: print_plan
   use case_warnings_m, only: find_case_warnings
   use set_up_file_m, only: write_set_up
-  use all_parameters_m, only: all_parameters
   use memory_plan_m, only: require_memory
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
   use start_bodies_m, only: read_start
-  use output_m, only: output_t, check_output, open_output, write_due_output, close_output
-  use restart_m, only: read_restart
+  use output_folder_m, only: check_folder
+  use output_m, only: output_t, name_folder, open_output, write_due_output, close_output
+  use restart_m, only: all_parameters, read_restart
   use diagnostics_m, only: step_report_t
   use simulation_m, only: simulation_t, simulation_init, resume, measure
   use step_m, only: take_step, measure_overlap
@@ -130,7 +130,7 @@ contains
   !> The case with its shapes; every problem with them is reported at once.
   subroutine read_and_check()
     type(problems_t) :: problems, warnings
-    character(:), allocatable :: text, message
+    character(:), allocatable :: text, what, path, message
     logical :: there
     integer :: n
 
@@ -150,7 +150,11 @@ contains
     call check_case(case, shapes, bed, problems)
     call check_widths(case, shapes, problems)
     call check_initial_state(case, problems)
-    call check_output(case, options, problems)
+    if (len(options%restart) == 0) then
+      call name_folder(case, options, what, path)
+      call check_folder(what, path, code, message)
+      if (code /= exit_ok) call problems%add_message(message)
+    end if
     there = .false.
     if (len(options%plan) > 0) inquire (file=options%plan, exist=there)
     if (there) call problems%add('--plan', options%plan, 'is there already, must be a new file')

@@ -8,11 +8,10 @@ module c_library_m
   public :: c_close, c_closedir, c_dup, c_errno, c_exit, c_faccessat, c_fclose, c_fileno, &
     c_flock, c_fopen, c_fstat, c_fsync, c_ftruncate, c_gethostname, c_getpid, c_getrlimit, &
     c_isatty, c_lseek, c_mkdir, c_open, c_opendir, c_pread, c_pwrite, c_read, c_readdir, &
-    c_realpath, c_rename, c_renameat, c_setenv, c_signal, c_stat, c_strerror, c_unlink, &
+    c_rename, c_renameat, c_setenv, c_signal, c_stat, c_strerror, c_unlink, &
     c_unlinkat, c_usleep
   public :: text_at, text_of_letters
 
-  integer, parameter, public :: max_path = 4096   !! PATH_MAX of Linux
   integer, parameter, public :: stat_size = 64    !! longs, more than any system writes
 
   interface
@@ -187,13 +186,6 @@ module c_library_m
       implicit none
       type(c_ptr), value :: folder
     end function c_closedir
-
-    type(c_ptr) function c_realpath(path, found) bind(c, name='realpath')
-      import :: c_char, c_ptr, max_path
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      character(kind=c_char), intent(out) :: found(max_path)
-    end function c_realpath
 
     ! The process and its system.
     integer(c_int) function c_getpid() bind(c, name='getpid')

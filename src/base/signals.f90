@@ -6,13 +6,11 @@
 !! files like a full disk.
 module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
-  use kinds_m, only: wp
   use c_library_m, only: c_signal
   use system_m, only: signal_user
-  use parallel_m, only: global_max
   implicit none
   private
-  public :: catch_signals, signal_caught
+  public :: catch_signals
   public :: signal_interrupt, signal_terminate
 
   ! The numbers that Linux, macOS and the BSDs give them; they differ in SIGUSR1 alone.
@@ -25,7 +23,7 @@ module signals_m
   integer, parameter :: caught_here(*) = [signal_hang_up, signal_interrupt, signal_user, &
     signal_pipe, signal_terminate, signal_cpu_time, signal_file_size]
 
-  integer(c_int), volatile :: caught = 0
+  integer(c_int), public, protected, volatile :: signal_caught = 0   !! by this process; 0: none
 
 contains
 
@@ -39,21 +37,11 @@ contains
     end do
   end subroutine catch_signals
 
-  !> The signal that any process caught, or zero; all processes call this and get the same answer.
-  function signal_caught() result(number)
-    integer :: number
-    real(wp) :: largest(1)
-
-    largest = real(caught, wp)
-    call global_max(largest)
-    number = nint(largest(1))
-  end function signal_caught
-
   !> The handler.
   subroutine remember(number) bind(c)
     integer(c_int), value :: number
 
-    if (number /= signal_file_size) caught = number
+    if (number /= signal_file_size) signal_caught = number
   end subroutine remember
 
 end module signals_m

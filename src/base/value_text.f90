@@ -36,7 +36,10 @@ contains
 
     word = lower_case(text)
     info = value_malformed
-    if (is_not_finite(word)) info = value_not_finite
+    associate (unsigned => word(first_digit(word):))
+      if (any(unsigned == [character(8) :: 'nan', 'inf', 'infinity']) &
+          .or. index(unsigned, 'nan(') == 1) info = value_not_finite
+    end associate
     if (info == value_not_finite) return
     mantissa_end = scan(word, 'ed') - 1
     if (mantissa_end < 0) mantissa_end = len(word)
@@ -239,17 +242,6 @@ contains
     end do
     distance = last(len(b))
   end function edit_distance
-
-  !> Is the word one of the spellings of infinity or not-a-number?
-  pure function is_not_finite(word) result(yes)
-    character(*), intent(in) :: word  !! small letters
-    logical :: yes
-
-    select case (word(first_digit(word):))
-    case ('nan', 'inf', 'infinity'); yes = .true.
-    case default; yes = index(word(first_digit(word):), 'nan(') == 1
-    end select
-  end function is_not_finite
 
   !> Place behind a sign.
   pure integer function first_digit(word)

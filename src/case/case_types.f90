@@ -67,10 +67,8 @@ module case_types_m
     character(:), allocatable :: initial_state      !! HDF5 file; '': none
   end type fluid_t
 
-  type :: water_t
+  type, extends(group_t) :: water_t
     real(wp) :: min(3) = absent, max(3) = absent    !! a box of liquid at t = 0 [m]
-    integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! where the box is is not known
   end type water_t
 
   type :: numerics_t

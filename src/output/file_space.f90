@@ -125,18 +125,14 @@ contains
     integer(i8), intent(in) :: old, new      !! chunks that are there, and that will come
     integer, intent(in) :: rank              !! of the dataset
     integer(i8) :: bytes
-    integer(i8) :: nodes, n
+    integer, parameter :: deepest = 8   ! levels of the tree, and splits of a leaf
+    integer(i8) :: nodes
 
     bytes = new*chunk_bytes
     if (new == 0) return
     if (compressed) bytes = bytes + new*(chunk_bytes/32 + 512)
     nodes = 1
-    n = (old + new)/64
-    if (n > 0) nodes = 2 + new/16
-    do while (n > 0)
-      nodes = nodes + 1
-      n = n/32
-    end do
+    if (old + new >= 64) nodes = deepest + new/16
     bytes = bytes + nodes*(24 + 64*8 + 65*(8 + 8*(rank + 1)))
   end function bytes_for_chunks
 

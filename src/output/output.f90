@@ -4,7 +4,7 @@
 !! process at least; the caller then closes the output and ends with `fatal`.
 module output_m
   use kinds_m, only: wp, i8
-  use errors_m, only: problems_t, exit_ok, exit_files
+  use errors_m, only: exit_ok, exit_files
   use parallel_m, only: broadcast, is_root
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
@@ -13,7 +13,7 @@ module output_m
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use table_m, only: result_file_t
-  use output_folder_m, only: check_folder, prepare_folder, continue_folder
+  use output_folder_m, only: prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
   use diagnostics_m, only: step_report_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
@@ -24,7 +24,7 @@ module output_m
     write_summary
   implicit none
   private
-  public :: output_t, check_output, open_output, write_due_output, close_output
+  public :: output_t, name_folder, open_output, write_due_output, close_output
 
   character(*), parameter :: run_name = 'run.h5', field_name = 'fields.vtkhdf', &
     block_name = 'blocks.vtkhdf'
@@ -103,20 +103,6 @@ contains
     what = '&run output'
     path = trim(case%run%output)
   end subroutine name_folder
-
-  !> Note what forbids the folder of a run that starts anew, nothing is changed. All processes call.
-  subroutine check_output(case, options, problems)
-    type(case_t), intent(in) :: case
-    type(options_t), intent(in) :: options
-    type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: what, path, message
-    integer :: code
-
-    if (len(options%restart) > 0) return
-    call name_folder(case, options, what, path)
-    call check_folder(what, path, code, message)
-    if (code /= exit_ok) call problems%add_message(message)
-  end subroutine check_output
 
   !> The row of this moment.
   subroutine set_row(state, report, output)

@@ -4,10 +4,10 @@
 !! empty is refused, and so is one in which another program is at work. Only the root process looks
 !! and acts; the outcome is broadcast.
 module output_folder_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use c_library_m, only: c_closedir, c_mkdir, c_opendir, c_readdir, c_realpath, &
-    c_rename, max_path, text_of_letters
+  use c_library_m, only: c_closedir, c_mkdir, c_opendir, c_readdir, c_rename, c_stat, &
+    stat_size
   use kinds_m, only: i8
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
@@ -156,6 +156,8 @@ contains
     integer, intent(out) :: code
     character(:), allocatable, intent(out) :: message
     character(:), allocatable :: from
+    integer(c_long) :: there(stat_size, 2)
+    logical :: same   ! folder
     integer :: i, made
 
     code = exit_ok
@@ -164,7 +166,11 @@ contains
     if (index(restart, '/') > 0) from = trimmed(restart(:index(restart, '/', back=.true.)))
     path = from
     if (len(output) > 0) path = trimmed(output)
-    if (whole_path(path) == whole_path(from)) then
+    same = path == from
+    if (c_stat(path//c_null_char, there(:, 1)) == 0) then   ! device and inode tell
+      if (c_stat(from//c_null_char, there(:, 2)) == 0) same = all(there(:2, 1) == there(:2, 2))
+    end if
+    if (same) then
       if (is_root()) call lock%take(path, code, message)
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
@@ -206,16 +212,6 @@ contains
 
     short = path(:max(verify(path, '/ ', back=.true.), min(1, len(path))))
   end function trimmed
-
-  !> The path from the root without links and dots; the path as it is where there is nothing.
-  function whole_path(path) result(whole)
-    character(*), intent(in) :: path
-    character(:), allocatable :: whole
-    character(kind=c_char) :: found(max_path)
-
-    whole = path
-    if (c_associated(c_realpath(path//c_null_char, found))) whole = text_of_letters(found)
-  end function whole_path
 
   function exists(path) result(yes)
     character(*), intent(in) :: path

@@ -34,8 +34,7 @@ contains
     integer :: number
     real(wp) :: of_any(1), now, kept
 
-    of_any = real(signal_caught(), wp)
-    if (of_any(1) > 0.0_wp) self%reason = 'stopped by a signal'
+    of_any = real(signal_caught, wp)
     if (is_root() .and. .not. of_any(1) > 0.0_wp) then
       now = wall_clock()
       self%slowest = max(self%slowest, now - self%last)
@@ -56,6 +55,7 @@ contains
     end if
     call global_max(of_any)
     number = nint(of_any(1))
+    if (number > 0 .and. len(self%reason) == 0) self%reason = 'stopped by a signal'
   end function stop_asked
 
 end module stop_requests_m

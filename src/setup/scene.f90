@@ -48,17 +48,10 @@ contains
     type(case_t) :: good          ! the good bodies and one more, no drops
     type(shape_t), allocatable :: made(:)
     logical :: use_it(size(case%body))
-    integer :: s, n
+    integer :: n
 
-    n = count(shapes%volume > 0.0_wp)
-    if (n == 0) return
-    allocate (made(n))
-    n = 0
-    do s = 1, size(shapes)
-      if (.not. shapes(s)%volume > 0.0_wp) cycle
-      n = n + 1
-      made(n) = shapes(s)
-    end do
+    if (.not. any(shapes%volume > 0.0_wp)) return
+    made = pack(shapes, shapes%volume > 0.0_wp)
     do n = 1, size(case%body)
       use_it(n) = .not. case%body(n)%faulty .and. any(made%name == case%body(n)%shape)
     end do

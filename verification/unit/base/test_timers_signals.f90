@@ -52,12 +52,12 @@ contains
     integer :: info
 
     call catch_signals()
-    call check('none yet', signal_caught(), 0)
+    call check('none yet', signal_caught, 0)
     info = c_raise(int(signal_interrupt, c_int))
     call check('raised', info, 0)
-    call check('interrupt', signal_caught(), 2)
+    call check('interrupt', signal_caught, 2)
     info = c_raise(int(signal_terminate, c_int))
-    call check('terminate', signal_caught(), 15)
+    call check('terminate', signal_caught, 15)
   end subroutine test_signals
 
 end module test_timers_signals_m
