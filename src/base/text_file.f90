@@ -1,8 +1,8 @@
 !> The bytes of a file and what makes text of them: UTF-8 or Latin-1, line ends of every system, a
 !! byte-order mark. Each procedure takes a time in proportion to the size.
 module text_file_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_null_char
-  use c_library_m, only: c_close, c_open, c_read
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_size_t, c_null_char
+  use c_library_m, only: c_close, c_lseek, c_open, c_read
   use value_text_m, only: byte_order_mark
   implicit none
   private
@@ -12,22 +12,30 @@ module text_file_m
 
 contains
 
-  !> All bytes of a file, a pipe or a device, or of standard input if `file` is empty; more than
-  !! `most` are a problem.
+  !> All bytes of a file or a pipe, or of standard input if `file` is empty; more than `most` are a
+  !! problem. Devices without an end have no length either.
   subroutine read_bytes(file, most, text, problem)
     character(*), intent(in) :: file
     integer, intent(in) :: most
     character(:), allocatable, intent(out) :: text
     character(:), allocatable, intent(out) :: problem   !! empty: none
+    integer(c_int), parameter :: from_start = 0, from_here = 1, from_end = 2
+    integer(c_long) :: start, length
     integer(c_size_t) :: n, got
     integer(c_int) :: number
 
     number = 0   ! of standard input
     if (len(file) > 0) number = c_open(file//c_null_char, 0_c_int)
-    text = repeat(' ', 8192)
+    length = 8192
+    start = c_lseek(number, 0_c_long, from_here)   ! below 0: a pipe, whose length shows at its end
+    if (start >= 0) then
+      length = min(c_lseek(number, 0_c_long, from_end) - start, most + 1_c_long)
+      start = c_lseek(number, start, from_start)
+    end if
+    allocate (character(length) :: text)
     n = 0
     do
-      if (n == len(text)) text = text//repeat(' ', len(text))
+      if (n == len(text) .and. start < 0) text = text//repeat(' ', len(text))
       got = c_read(number, text(n + 1:), len(text) - n)
       if (got <= 0) exit
       n = n + got
