@@ -158,7 +158,7 @@ def moved(world: World, folder: Path) -> None:
 
 def bodies(world: World, folder: Path) -> None:
     """The last body first."""
-    world = world.changed("numerics", solid_fraction="exact")
+    world = world.changed("numerics", solid_fraction="exact", coupling="monolithic")
 
     def change(world: World, _: Array) -> World:
         found = [group for group in world.groups if group[0] == "body"][::-1]
