@@ -6,6 +6,7 @@ program mics
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
+  use c_library_m, only: c_errno
   use errors_m, only: problems_t, fatal, to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use stack_limit_m, only: check_stack
@@ -185,6 +186,10 @@ contains
 
   !> End in good order before a run began.
   subroutine finish()
+    integer, parameter :: lost(2) = [5, 28]   ! EIO, ENOSPC; the library says nothing of them
+
+    flush (output_unit)
+    if (any(c_errno() == lost)) call fatal(exit_files, 'standard output cannot be written')
     call parallel_final()
     stop
   end subroutine finish

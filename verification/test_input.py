@@ -262,3 +262,13 @@ def test_ranks_read_standard_input(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.count(UNKNOWN) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [["--check"], ["--version"], ["--help"]])
+def test_a_full_standard_output_is_told(words: list[str]) -> None:
+    """Nobody takes half a plan for a whole one."""
+    case = TANK.encode() + b"&fluid water_level = 0.1 /\n"
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(["mics", *words], input=case, stdout=full, stderr=subprocess.PIPE,
+                              executable=ROOT / "mics")  # fmt: skip
+    assert done.returncode == 4 and b"standard output cannot be written" in done.stderr

@@ -73,6 +73,18 @@ def test_what_is_refused(filled: Path, start: str, rest: str, message: str) -> N
     assert done.returncode == 2 and message in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize("drop", ["", "&drop shape = 'cube'  position = 3*0.06  count = 2 /\n"])
+def test_units_keep_their_names(drop: str, tmp_path: Path) -> None:
+    """Whether they come along or are named again without a name."""
+    table = "shape,x,y,z,time,name\ncube,0.06,0.04,0.1,0,A1\ncube,0.12,0.04,0.1,0,B 2\n"
+    (tmp_path / "plan.csv").write_text(table)
+    assert mics(tmp_path, FILL + GRID + CUBE + "&drop file = 'plan.csv' /\n").returncode == 0
+    done = mics(tmp_path, THEN + GRID + CUBE + "&start file = 'fill/run.h5' /\n" + drop)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "then" / "run.h5") as h5:
+        assert [name.decode().strip() for name in h5["bodies/name"][:]] == ["A1", "B 2"]
+
+
 def test_other_shapes_are_refused(filled: Path) -> None:
     start = "&start file = 'fill/run.h5' /\n"
     ball = CUBE.replace("'cube'", "'ball'", 1) + THREE.replace("'cube'", "'ball'")

@@ -134,6 +134,7 @@ contains
       do i = 1, begun%n
         b = begun%block(i)
         if (begun%drop(i) > 0) b = b + size(case%body) + sum(case%drop(:begun%drop(i) - 1)%count)
+        if (blocks%name(b) == '') blocks%name(b) = begun%name(i)
         blocks%x(:, b) = begun%x(:, i)
         blocks%planned(:, b) = begun%x(:2, i)
         blocks%q(:, b) = begun%q(:, i)

@@ -84,6 +84,7 @@ contains
     type(place_t) :: place
 
     place%shape = body%shape
+    place%name = body%name
     place%x = body%position
     place%q = normalised(body%quaternion)
     place%planned = body%position(:2)

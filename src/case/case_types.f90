@@ -118,6 +118,7 @@ module case_types_m
 
   type, extends(group_t) :: body_input_t
     character(name_length) :: shape = ''            !! required
+    character(name_length) :: name = ''             !! of a unit of another run
     real(wp) :: position(3) = absent                !! required: centre of mass [m]
     !> w, x, y, z, normalised; axis and angle end up here as well.
     real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -184,7 +185,7 @@ module case_types_m
     integer :: n = 0
     real(wp) :: time = 0.0_wp                       !! of that run [s]
     integer, allocatable :: drop(:), block(:)       !! (n) block of a drop, or (0, body)
-    character(name_length), allocatable :: shape(:)
+    character(name_length), allocatable :: shape(:), name(:)
     real(wp), allocatable :: x(:, :), q(:, :), v(:, :), omega(:, :)   !! (3, n), q (4, n)
   end type begun_t
 

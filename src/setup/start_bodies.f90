@@ -80,9 +80,11 @@ contains
     if (file%info == 0) left%n = product(extent)
     associate (n => left%n)
       allocate (left%shape(n), release_time(n))
+      left%name = spread(repeat(' ', name_length), 1, n)
       mass = spread(0.0_wp, 1, n)
       allocate (left%x(3, n), left%q(4, n), left%v(3, n), left%omega(3, n), fixed(n))
       call file%read('/bodies/shape', left%shape)
+      if (file%has('/bodies/name')) call file%read('/bodies/name', left%name)
       call file%read('/bodies/mass', mass)
       call file%read('/bodies/fixed', fixed)
       call file%read('/bodies/release_time', release_time)
@@ -200,6 +202,7 @@ contains
       begun%n = size(named)
       begun%time = left%time
       begun%shape = left%shape(named)
+      begun%name = left%name(named)
       begun%x = left%x(:, named) + spread(case%start%shift, 2, size(named))
       begun%q = left%q(:, named)
       begun%v = left%v(:, named)
@@ -264,6 +267,7 @@ contains
       if (.not. along(k)) cycle
       n = n + 1
       body(n)%shape = left%shape(k)
+      body(n)%name = left%name(k)
       body(n)%position = left%x(:, k) + case%start%shift
       body(n)%quaternion = left%q(:, k)
       body(n)%velocity = left%v(:, k)

@@ -302,18 +302,6 @@ def test_a_damaged_file_is_one_line(broken: Path, kind: str, capsys) -> None:
     assert end.value.code == 2 and line.startswith(f"mics-tools report: {broken}/run.h5: ")
 
 
-def test_a_file_of_other_bytes_is_one_line(broken: Path) -> None:
-    """Cut anywhere, or with zeros in the place of a part."""
-    content = (broken / "run.h5").read_bytes()
-    for n in range(0, len(content), len(content) // 40):
-        for damaged in (content[:n], content[:n] + bytes(512) + content[n + 512 :]):
-            (broken / "run.h5").write_bytes(damaged)
-            try:
-                look(Run(broken))
-            except BadRun as told:
-                assert str(told).startswith(f"{broken}/run.h5: ") and "\n" not in str(told)
-
-
 def test_blocks_as_a_table(loose_pile: Run) -> None:
     b, found = loose_pile.bodies, loose_pile.blocks
     assert len(found) == b.n * len(b.time)

@@ -32,6 +32,9 @@ STOPPED = 130
 def _plan(given: argparse.Namespace) -> Plan:
     text = program.case_text(given.case, given.settings)
     choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
+    for word in given.vary:
+        if re.fullmatch(r"[^=]+=\s*[+-]?\d+,\d+\s*", word):
+            print(f"--vary {word}: two values (a decimal has a point)", file=sys.stderr)
     folder = given.out or Path(f"mics-ensemble-{given.case.stem}")
     return Plan(text, folder, given.runs, given.seed, given.spread, given.tilt, choices)
 
