@@ -253,6 +253,7 @@ KINDS: dict[str, Damage] = {
     "a single number": put("series/time", 1.0),
     "times that fall": put("series/time", np.arange(11.0)[::-1]),
     "a time that is none": put("bodies/time", np.full(11, np.nan)),
+    "a time beyond all": put("bodies/time", np.linspace(0, 1e300, 11)),
     "no cells": put("grid/x", [0.0]),
     "a provenance of nothing": lambda h5: (drop("provenance")(h5), h5.create_group("provenance")),
     "a corner without a place": put("shapes/hexapod/points", np.full((8, 3), np.nan)),

@@ -82,16 +82,16 @@ def require_shape(group: h5py.Group, name: str, *shape: int | None) -> None:
 
 
 def finite(values: Any, name: str) -> Any:
-    """Coordinates, none of which may be missing."""
+    """Coordinates or times, none of which may be missing."""
     if not (np.abs(values) < 1e20).all():
-        raise ValueError(f"{name} has no place")
+        raise ValueError(f"{name} holds what is no number")
     return values
 
 
 def rising(values: Any, name: str, strictly: bool = False) -> Any:
     """Coordinates or times, which must be finite and rise."""
-    steps = np.diff(values)
-    if not np.isfinite(values).all() or (steps <= 0 if strictly else steps < 0).any():
+    steps = np.diff(finite(values, name))
+    if (steps <= 0 if strictly else steps < 0).any():
         raise ValueError(f"{name} does not rise")
     return values
 
