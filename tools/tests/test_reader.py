@@ -303,6 +303,15 @@ def test_a_damaged_file_is_one_line(broken: Path, kind: str, capsys) -> None:
     assert end.value.code == 2 and line.startswith(f"mics-tools report: {broken}/run.h5: ")
 
 
+@pytest.mark.parametrize("name", ["position", "quaternion", "velocity", "contact_force"])
+def test_a_report_of_no_numbers_is_one_line(broken: Path, name: str, capsys) -> None:
+    with h5py.File(broken / "run.h5", "r+") as h5:
+        h5[f"bodies/{name}"][2, 3] = np.nan
+    with pytest.raises(SystemExit):
+        cli.main(["report", str(broken)])
+    assert f"run.h5: bodies/{name} holds what is no number" in capsys.readouterr().err
+
+
 def test_blocks_as_a_table(loose_pile: Run) -> None:
     b, found = loose_pile.bodies, loose_pile.blocks
     assert len(found) == b.n * len(b.time)

@@ -28,7 +28,7 @@ from micstools.reading import block_numbers, health, places, scales, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
-from micstools.reading.reader import Run
+from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
 from micstools.shapes.geometry import Array
 
@@ -55,6 +55,9 @@ def page(run: Run, north: float | None = None) -> str:
     chosen = units.of_run(run)
     case = section("case", "The case", *(tag("p", words) for words in run_words.case(run, chosen)))
     last = (_settings(run), _provenance(run))
+    for name in ("position", "quaternion", "velocity", "fluid_force", "contact_force"):
+        if not (np.abs(getattr(run.bodies, name)) < 1e20).all():
+            raise BadRun(f"{run.folder}/run.h5: bodies/{name} holds what is no number")
     if not run.bodies.n:
         lead = (
             f"A run of {run.series.time[-1]:.3g} s without blocks; mics-tools plot draws its water."
