@@ -227,6 +227,7 @@ contains
     type(column_t), intent(inout) :: column
     integer(hid_t) :: list
     real(wp), target :: nothing
+    real(sp), target :: nothing_single
     integer :: status(7), rows
 
     rows = max(min_chunk_rows, chunk_bytes/(8*max(1, product(column%row))))
@@ -243,10 +244,14 @@ contains
       call h5pset_fletcher32_f(list, status(5))   ! a chunk that was changed on the disk is not read
       call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status(6))   ! many processes need it
     end if
-    nothing = -1.0_wp   ! in a row that never arrived, and in all but integers NaN
-    if (any(column%type == [H5T_NATIVE_DOUBLE, H5T_NATIVE_REAL])) nothing = ieee_value(nothing, &
-      ieee_quiet_nan)
-    call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status(7))
+    nothing = -1.0_wp   ! in a row that never arrived; NaN in reals, which HDF5 must not convert
+    if (column%type == H5T_NATIVE_DOUBLE) nothing = ieee_value(nothing, ieee_quiet_nan)
+    if (column%type == H5T_NATIVE_REAL) then
+      nothing_single = ieee_value(nothing_single, ieee_quiet_nan)
+      call h5pset_fill_value_f(list, H5T_NATIVE_REAL, c_loc(nothing_single), status(7))
+    else
+      call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status(7))
+    end if
     call file%check(minval(status), 'create '//column%name)
     call file%new_dataset(column, list)
     call h5pclose_f(list, status(1))
