@@ -27,7 +27,7 @@ module impulse_step_m
   integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
   integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
   real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
-  real(wp), parameter :: margin = 0.02_wp         !! of a contact point to come, over that edge [-]
+  real(wp), parameter :: margin = 0.05_wp         !! of a contact point to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
   real(wp), parameter :: free_way = 0.5_wp
     !! covered by the list of pairs, over a bounding radius [-]
