@@ -84,9 +84,9 @@ contains
     fluid%water_level = 0.0513_wp
     call fill_liquid(grid, fluid, [water_t ::], after, flow)
     call check('level', flow%liquid_initial, 0.16_wp*0.06_wp*0.0513_wp, 1.0e-17_wp)
-    water(1) = water_t([0.011_wp, 0.013_wp, 0.07_wp], [0.0533_wp, 0.041_wp, 0.1111_wp])
-    water(2) = water_t([0.042_wp, 0.020_wp, 0.05_wp], [0.0833_wp, 0.049_wp, 0.0911_wp])
-    water(3) = water_t([0.1_wp, -1.0_wp, -1.0_wp], [2.0_wp, 0.0021_wp, 2.0_wp])
+    water(1) = water_t(min=[0.011_wp, 0.013_wp, 0.07_wp], max=[0.0533_wp, 0.041_wp, 0.1111_wp])
+    water(2) = water_t(min=[0.042_wp, 0.020_wp, 0.05_wp], max=[0.0833_wp, 0.049_wp, 0.0911_wp])
+    water(3) = water_t(min=[0.1_wp, -1.0_wp, -1.0_wp], max=[2.0_wp, 0.0021_wp, 2.0_wp])
     call fill_liquid(grid, fluid, water, after, flow)
     call check('level and boxes, overlaps once', &
       flow%liquid_initial, 0.16_wp*0.06_wp*0.0513_wp + product([0.0423_wp, 0.028_wp, 0.0411_wp]) &
@@ -105,8 +105,8 @@ contains
     type(water_t) :: water(2)
 
     call set_boxes(grid, low_m, high_m, after)
-    water(1) = water_t([0.0111_wp, 0.0_wp, 0.0_wp], [0.0666_wp, 0.06_wp, 0.0666_wp])
-    water(2) = water_t([0.0555_wp, 0.0255_wp, 0.0_wp], [0.1_wp, 0.06_wp, 0.1_wp])
+    water(1) = water_t(min=[0.0111_wp, 0.0_wp, 0.0_wp], max=[0.0666_wp, 0.06_wp, 0.0666_wp])
+    water(2) = water_t(min=[0.0555_wp, 0.0255_wp, 0.0_wp], max=[0.1_wp, 0.06_wp, 0.1_wp])
     call fill_liquid(grid, fluid_t(), water, after, flow)
     call check('boxes around a solid', flow%liquid_initial, &
       product([0.0555_wp, 0.06_wp, 0.0666_wp]) + product([0.0445_wp, 0.0345_wp, 0.1_wp]) &

@@ -183,7 +183,8 @@ contains
     integer :: i, k
 
     call start([32, 4, 32], [0.32_wp, 0.04_wp, 0.32_wp], [.false., .true., .false.], nothing, &
-               nothing, -1.0_wp, [water_t([0.13_wp, 0.0_wp, 0.05_wp], [0.19_wp, 0.04_wp, 0.21_wp])])
+               nothing, -1.0_wp, [water_t(min=[0.13_wp, 0.0_wp, 0.05_wp], &
+               max=[0.19_wp, 0.04_wp, 0.21_wp])])
     do concurrent (k=grid%lo(3):grid%hi(3) + 1, i=grid%lo(1):grid%hi(1) + 1)
       x = [grid%face(i, 1), grid%face(k, 3)]
       flow%uf(i, :, k, 1) = (stream(x + [0.0_wp, grid%h(3)]) - stream(x))/grid%h(3)
@@ -313,7 +314,7 @@ contains
     high = reshape([0.0971_wp, 0.13_wp, 0.21_wp, 0.0671_wp, 0.0837_wp, 0.1577_wp], [3, 2])
     shift = 0.0_wp
     call start(tank_cells, tank, walls, low, high, 0.0613_wp, &
-               [water_t([0.0_wp, 0.0_wp, 0.0_wp], [0.09_wp, 0.12_wp, 0.1_wp])])
+               [water_t(min=[0.0_wp, 0.0_wp, 0.0_wp], max=[0.09_wp, 0.12_wp, 0.1_wp])])
     left = sum(flow%liquid(1:9, 1:12, 1:20))
     right = sum(flow%liquid(10:16, 1:12, 1:20))
     worst = 0.0_wp

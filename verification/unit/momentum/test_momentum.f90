@@ -128,7 +128,8 @@ contains
     integer :: step, d
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
-      [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], nothing, nothing)
+      [water_t(min=[0.033_wp, 0.011_wp, 0.027_wp], max=[0.091_wp, 0.057_wp, 0.083_wp])], &
+      nothing, nothing)
     call vortex(0.2_wp, stream)
     do d = 1, 3
       flow%u(:, :, :, d) = stream(d)
@@ -147,7 +148,8 @@ contains
     integer :: i, j, k, step
 
     call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
-      [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], nothing, nothing)
+      [water_t(min=[0.033_wp, 0.011_wp, 0.027_wp], max=[0.091_wp, 0.057_wp, 0.083_wp])], &
+      nothing, nothing)
     call vortex(0.2_wp, stream)
     do concurrent (k=1:12, j=1:8, i=1:16)
       flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), cos(0.4_wp*i*j)]
