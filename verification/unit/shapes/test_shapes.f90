@@ -62,7 +62,7 @@ contains
     integer :: t, m
 
     call build(kind, size_m, refinement, s)
-    volume = [(tet_volume(s%point(:, s%tet(:, t))), t=1, size(s%tet, 2))]
+    allocate (volume, source=[(tet_volume(s%point(:, s%tet(:, t))), t=1, size(s%tet, 2))])
     call check(kind//': the tetrahedra fill the block', sum(volume), s%volume, &
                epsilon(1.0_wp)*real(size(s%tet, 2), wp)*s%volume)
     call check(kind//': tetrahedra of positive volume', all(volume > 1e-7_wp*s%volume))
