@@ -149,8 +149,8 @@ contains
     integer :: n
 
     n = size(blocks%shapes(1)%point, 2)
-    at = (spread(blocks%x(:, 1), 2, n) + matmul(rotation_matrix(blocks%q(:, 1)), &
-      blocks%shapes(1)%point))/spread(grid%h, 2, n)
+    allocate (at, source=(spread(blocks%x(:, 1), 2, n) + matmul(rotation_matrix(blocks%q(:, 1)), &
+      blocks%shapes(1)%point))/spread(grid%h, 2, n))
     is_moved = any(abs(at - anint(at)) > 1e-13_wp .and. abs(at - anint(at)) < 1.1e-5_wp)
   end function is_moved
 

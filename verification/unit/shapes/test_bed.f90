@@ -213,10 +213,9 @@ contains
   !> The surface of the shape at a pose as the bed, three corners a triangle as in an STL file.
   subroutine lie_as_bed(x, q)
     real(wp), intent(in) :: x(3), q(4)
-    type(bed_form_t) :: fresh
     integer :: t, c, n
 
-    form = fresh
+    form = bed_form_t()
     n = size(shapes(1)%triangle, 2)
     form%point = reshape([((x + rotate(q, shapes(1)%point(:, shapes(1)%triangle(c, t))), c=1, 3), &
       t=1, n)], [3, 3*n])
