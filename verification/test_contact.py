@@ -147,7 +147,7 @@ def test_a_heap_settles(tmp_path: Path) -> None:
         assert np.abs(h5["bodies/velocity"][-1]).max() < 1e-3
         place = h5["bodies/position"][-1]
         assert (np.abs(place[:, :2] - 0.12) < 0.12).all()
-        assert place[:, 2].max() > 0.04, "some lie on others"
+        assert place[:, 2].max() > 1.5 * np.median(place[:, 2]), "some lie on others"
         size = min(float(shape.attrs["volume"]) for shape in h5["shapes"].values()) ** (1 / 3)
         assert h5["series/max_overlap"][-1] < 0.01 * size
         drawn = h5["bodies/shape"].asstr()[:]

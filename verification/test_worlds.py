@@ -69,15 +69,6 @@ def test_honey_comes_to_rest(tmp_path: Path) -> None:
     assert energy[-1] < energy[1]
 
 
-def test_a_landing_gives_no_energy(tmp_path: Path) -> None:
-    """The stop of the sphere was given to the fluid in cells whose centre is near its wall, times
-    the inverse of the share of the wall's motion that their mean lacks: 2.5 times the energy."""
-    series = balance.landing().run(tmp_path).series
-    late = series.time > 0.085
-    energy = series.kinetic_energy_fluid
-    assert energy[late].max() < energy[~late].max()
-
-
 def test_every_law_is_tested() -> None:
     """Each has worlds in the list."""
     assert set(SEEDS) == set(LAWS)

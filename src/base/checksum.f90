@@ -12,6 +12,7 @@ module checksum_m
   private
   public :: checksum_t
 
+  integer, parameter :: chunk = 4096                        !! numbers turned into words at a time
   integer(i8), parameter :: modulus = 2_i8**32 + 15_i8
   integer(i8), parameter :: mask = 2_i8**32 - 1_i8
 
@@ -32,8 +33,12 @@ contains
     class(checksum_t), intent(inout) :: self
     integer, intent(in) :: n
     real(wp), intent(in) :: x(n)
+    integer :: first, last
 
-    call self%add_words(transfer(x, [0_int32]))
+    do first = 1, n, chunk
+      last = min(first + chunk - 1, n)
+      call self%add_words(transfer(x(first:last), [0_int32]))
+    end do
   end subroutine checksum_add_reals
 
   !> Add n integers of an array of any rank.
@@ -41,20 +46,23 @@ contains
     class(checksum_t), intent(inout) :: self
     integer, intent(in) :: n
     integer, intent(in) :: x(n)
+    integer :: first, last
 
-    call self%add_words(transfer(x, [0_int32]))
+    do first = 1, n, chunk
+      last = min(first + chunk - 1, n)
+      call self%add_words(transfer(x(first:last), [0_int32]))
+    end do
   end subroutine checksum_add_integers
 
   !> Add a text and its length.
   subroutine checksum_add_text(self, text)
     class(checksum_t), intent(inout) :: self
     character(*), intent(in) :: text
-    integer, parameter :: piece = 2**14   ! of a text that may be that of a large file
     integer :: first, i
 
     call self%add_words([int(len(text), int32)])
-    do first = 1, len(text), piece
-      call self%add_words([(ichar(text(i:i), int32), i=first, min(first + piece - 1, len(text)))])
+    do first = 1, len(text), 4*chunk
+      call self%add_words([(ichar(text(i:i), int32), i=first, min(first + 4*chunk - 1, len(text)))])
     end do
   end subroutine checksum_add_text
 
@@ -66,21 +74,18 @@ contains
     write (text, '(2z9.9)') self%weighted, self%plain
   end function checksum_text
 
-  !> Add words; the sums stay below 2**62 between the reductions.
+  !> Add up to 2**14 words; the sums stay below 2**62 between the reductions.
   pure subroutine add_words(self, words)
     class(checksum_t), intent(inout) :: self
     integer(int32), intent(in) :: words(:)
-    integer, parameter :: chunk = 8192
-    integer :: first, i
+    integer :: i
 
-    do first = 1, size(words), chunk
-      do i = first, min(first + chunk - 1, size(words))
-        self%plain = self%plain + iand(int(words(i), i8), mask)
-        self%weighted = self%weighted + self%plain
-      end do
-      self%plain = modulo(self%plain, modulus)
-      self%weighted = modulo(self%weighted, modulus)
+    do i = 1, size(words)
+      self%plain = self%plain + iand(int(words(i), i8), mask)
+      self%weighted = self%weighted + self%plain
     end do
+    self%plain = modulo(self%plain, modulus)
+    self%weighted = modulo(self%weighted, modulus)
   end subroutine add_words
 
 end module checksum_m

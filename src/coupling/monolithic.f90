@@ -249,17 +249,13 @@ contains
                viscous => self%viscous, merged => self%merged, balance => self%balance)
       call fill_velocity_halo(grid, u)
       call store_velocity(grid, merged, u, balance%before)
-      ! The walls as contact and the forces so far move them, like u: T_c is small where a wall has
-      ! a centre, and 1/T_c times what contact changes of its motion would be given to the fluid.
-      self%predicted%x = bodies%x
-      self%predicted%motion = bodies%motion
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, self%predicted, u, merged)
-        call to_centres(grid, merged, self%predicted, u)
+        call find_centres(grid, solid, self%at_start, u, merged)
+        call to_centres(grid, merged, self%at_start, u)
       end if
       call build_viscous(grid, solid, bodies, self%rho, s%flow%mu, s%dt, viscous, merged)
       call predict_velocity(s, self%rho, self)
-      call to_centres(grid, merged, self%predicted, u, back=.true.)
+      call to_centres(grid, merged, self%at_start, u, back=.true.)
       call fill_velocity_halo(grid, u, layers=1)
       call follow_targets(grid, merged, balance%mass, balance%before, u, balance%to_wall)
       self%force(:, :, by_viscosity) = viscous%force

@@ -56,26 +56,6 @@ def honey() -> World:
     )  # fmt: skip
 
 
-def landing() -> World:
-    """A sphere that lands on the floor in thick oil and presses out what is below it."""
-    sphere = {"shape": "s", "position": [0.064211, 0.0554631, 0.0628113],
-              "velocity": [-0.197358, -0.116621, -0.0448541], "quaternion": [9.0, 6.0, 6.0, 0.0],
-              "angular_velocity": [-4.48638785, 2.08296579, 2.40342206]}  # fmt: skip
-    return World(
-        [
-            ("run", {"t_end": 0.2, "dt": 0.0134, "field_interval": 0.0, "restart_interval": 0.0}),
-            ("grid", {"cells": [11, 7, 14], "length": [0.239931, 0.114717, 0.23406]}),
-            ("boundary", draw.ALONG_X),
-            ("fluid", {"liquid_density": 700.0, "liquid_viscosity": 0.56234, "gas_density": 0.84,
-                       "water_level": 0.11703}),
-            ("contact", {"solver": "impulses", "contact_time": 2.8e-3, "restitution": 0.275}),
-            ("shape", {"name": "s", "kind": "sphere", "size": 0.093313, "density": 2492.8,
-                       "refinement": 1}),
-            ("body", sphere),
-        ]
-    )  # fmt: skip
-
-
 def motion(world: World, run: Run) -> Array:
     """Kinetic energy of the fluid in each row over rho g h^4 [-]."""
     h = run.grid.spacing.prod() ** (1 / 3)
