@@ -57,7 +57,7 @@ def page(run: Run, north: float | None = None) -> str:
     last = (_settings(run), _provenance(run))
     for name in ("position", "quaternion", "velocity", "fluid_force", "contact_force"):
         values = getattr(run.bodies, name)
-        if not (np.abs(values) < 1e20).all() and not np.isnan(values).all():   # none: a dry run
+        if not (np.abs(values) < 1e20).all() and not np.isnan(values).all():  # none: a dry run
             raise BadRun(f"{run.folder}/run.h5: bodies/{name} holds what is no number")
     if not run.bodies.n:
         lead = (
