@@ -43,7 +43,7 @@ from synthetic import Motion, write_run  # noqa: E402
 from test_pile_ensemble import write_ensemble  # noqa: E402
 
 CASE = """! a remark that stays
-&run t_end = 50  dt = 0.002  physics = 'dry'  output = 'mics-here'  title = 'Two cubes' /
+&run t_end = 500  dt = 0.002  physics = 'dry'  output = 'mics-here'  title = 'Two cubes' /
 &grid cells = 4, 2, 3  length = 0.4, 0.2, 0.3 /
 &shape name = 'cube'  kind = 'cube'  size = 0.05 /
 &body shape = 'cube'  position = 0.1, 0.1, 0.035 /
@@ -512,7 +512,7 @@ def test_a_change_keeps_the_rest(draft: Draft) -> None:
     draft.edit({"op": "set", "group": "drop", "n": 0, "variable": "first_time", "value": ""})
     draft.edit({"op": "copy", "group": "drop", "n": 0})
     draft.edit({"op": "set", "group": "drop", "n": 1, "variable": "count", "value": "3"})
-    assert draft.text.startswith("! a remark that stays\n&run t_end = 50  dt = 0.002")
+    assert draft.text.startswith("! a remark that stays\n&run t_end = 500  dt = 0.002")
     assert settings.value(draft.text, "grid", "length") == [1, 2, 3]
     assert settings.value(draft.text, "drop", "first_time") is None
     assert [settings.value(draft.text, "drop", "count", n) for n in (0, 1)] == [None, 3]
