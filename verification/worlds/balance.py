@@ -7,7 +7,6 @@ import numpy as np
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, below_plane
-from worlds import draw
 from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
