@@ -12,8 +12,8 @@
 !! Source: Macklin et al. (2019), Small steps in physics simulation; Catto (2024), Solver2D.
 !!
 !! Where a row was hit, sweeps over the impulses of the whole step go on through the chain of bodies
-!! that this reaches until nothing closes, v = v_c. Then each row gives back e times what its
-!! impulse gained beyond the load before, gamma_b, normal and tangential alike (Poisson):
+!! that this reaches until little changes, 80 at most: v = v_c. Then each row gives back e times
+!! what its impulse gained beyond the load before, gamma_b, normal and tangential alike (Poisson):
 !!
 !! $$ \gamma = \gamma_c + e (\gamma_c - \gamma_b), \qquad v = v_c + e (v_c - v_b). $$
 !!
