@@ -5,13 +5,12 @@ of them: it may have up to ALLOWANCE more at its peak, and no more. (Frames fill
 which is bounded: a run of 10,000 frames has 13 MB more than one of 500, one of 20,000 no more.)
 """
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from micstools.bench.timing import timed
 from run_cases import Machine
 from run_soak import Given
-from soak.shop import start
 
 ALLOWANCE = 1.0e6  # bytes; before the first leak was mended 1,000 steps took 29 MB
 DT = 1.0e-4
@@ -23,12 +22,8 @@ def peak(machine: Machine, steps: int, work: Path) -> int:
     """Most memory that a run of so many steps had at once [bytes]."""
     case = work / f"{steps}.nml"
     case.write_text(CASE.format(t_end=steps * DT, dt=DT))
-    process = start(machine, "--output", work / f"run-{steps}", case)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode != 0:
-        raise RuntimeError(f"{steps} steps: exit code {process.returncode}")
-    return 1024 * usage.ru_maxrss
+    words = [*machine.command, "--output", work / f"run-{steps}", case]
+    return int(timed(words, work)[2])
 
 
 def growth(machine: Machine, steps: int, work: Path) -> tuple[str, list[str]]:

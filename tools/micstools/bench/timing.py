@@ -35,31 +35,43 @@ def mpirun(ranks: int) -> list[str]:
     return words if ranks > 1 else []
 
 
+ALONE = """import resource, subprocess, sys
+code = subprocess.call(sys.argv[2:])
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+with open(sys.argv[1], "w") as told:
+    print(used.ru_utime + used.ru_stime, used.ru_maxrss, file=told)
+sys.exit(code)
+"""
+
+
+def alone(told: Path, *words: object) -> list[str]:
+    """A command by a small Python, which writes the CPU seconds and the largest memory [kB] into a
+    file. Linux counts what the calling process holds as taken by what it starts."""
+    return [sys.executable, "-I", "-S", "-c", ALONE, *map(str, (told, *words))]
+
+
 def timed(
     words: Sequence[object], folder: Path, excused: str | None = None
 ) -> tuple[float, float, float]:
     """Run a program: wall and CPU seconds, its own and its children's, and largest memory of one of
     them [bytes]. An exit code other than 0 is an error, unless the program says what is
     `excused`."""
-    with tempfile.TemporaryFile("w+") as said:
+    with tempfile.NamedTemporaryFile("r") as told:
         began = time.perf_counter()
-        running = subprocess.Popen(
-            [str(word) for word in words],
+        done = subprocess.run(
+            alone(Path(told.name), *words),
             cwd=folder,
             env=os.environ | AS_ROOT,
-            stdout=said,
-            stderr=said,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
-        _, status, used = os.wait4(running.pid, 0)
         wall = time.perf_counter() - began
-        running.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        text = said.read()
-    if running.returncode and not (excused and excused in text):
-        last = text.strip().splitlines()[-1:] or ["nothing said"]
-        raise subprocess.SubprocessError(f"{words[0]} ended with {running.returncode}: {last[0]}")
-    unit = 1 if sys.platform == "darwin" else 1024
-    return wall, used.ru_utime + used.ru_stime, float(unit * used.ru_maxrss)
+        cpu, memory = map(float, told.read().split())
+    if done.returncode and not (excused and excused in done.stdout):
+        last = done.stdout.strip().splitlines()[-1:] or ["nothing said"]
+        raise subprocess.SubprocessError(f"{words[0]} ended with {done.returncode}: {last[0]}")
+    return wall, cpu, memory if sys.platform == "darwin" else 1024 * memory
 
 
 def processor() -> str:
