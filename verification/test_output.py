@@ -585,13 +585,16 @@ def test_no_permission(tmp_path: Path) -> None:
 
 
 def test_damaged_restart(wet: Path, tmp_path: Path) -> None:
-    path = tmp_path / "restart-a.h5"
-    data = bytearray((wet / "restart-a.h5").read_bytes())
-    data[len(data) // 2] ^= 1
-    path.write_bytes(data)
-    code, said = run(tmp_path / "copy", "--restart", path)
-    assert code == 4
-    assert "checksum" in said
+    """With a bit flipped anywhere it is refused, unless nobody needs that bit."""
+    path, whole, refused = tmp_path / "restart-a.h5", (wet / "restart-a.h5").read_bytes(), 0
+    for at in range(len(whole) // 20, len(whole), len(whole) // 10):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 16]) + whole[at + 1 :])
+        code, said = run(tmp_path / f"copy{at}", "--restart", path)
+        assert code in (0, 4), said
+        refused += code == 4
+        assert code == 4 or but_restarts(differences(wet, tmp_path / f"copy{at}")) == []
+        shutil.rmtree(tmp_path / f"copy{at}", ignore_errors=True)
+    assert refused > 5
     code, said = run(tmp_path / "copy", "--restart", tmp_path / "missing.h5")
     assert code == 4
     assert "missing.h5" in said

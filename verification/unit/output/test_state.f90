@@ -1,12 +1,18 @@
-!> The list of the state: nothing is missing, every change shows, sums do not know the ranks.
+!> The list of the state: nothing is missing, every change shows, sums do not know the ranks, and a
+!! restart file fits where it is planned. What it holds: `verification/test_bits.py`.
 ! ranks: 2 3
 module test_state_m
   use check_m, only: check, wp, i8
-  use parallel_m, only: nproc
+  use parallel_m, only: nproc, is_root
+  use restart_m, only: write_restart
+  use file_space_m, only: bytes_for_change
   use grid_m, only: grid_t
   use state_m, only: list_state
   use state_list_m, only: state_list_t, checksum_of_cells
-  use sample_state_m, only: sample_t, make_sample, fill_cells, checksums_of, first_change
+  use displacements_m, only: displacements_t
+  use checksum_m, only: checksum_t
+  use case_input_m, only: parameters_text
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_state
@@ -17,32 +23,33 @@ contains
     call test_every_change_shows()
     call test_checksum_of_cells()
     call test_owned_faces()
+    call test_size()
   end subroutine test_state
 
   !> Change one number of each array in turn: that array has another checksum, none before it in the
   !! list, and so has the state; after the change is undone both agree again.
   subroutine test_every_change_shows()
-    type(sample_t) :: s
+    type(world_t) :: s
     integer, parameter :: n_changes = 35
     integer :: i
     character(:), allocatable :: name, before
     character(18), allocatable :: each(:)
 
-    call make_sample(0.5_wp, .false., s)
+    call make_sample(0.5_wp, s)
     before = checksum(s)
     each = checksums_of(s)
     do i = 1, n_changes
       call change(s, i, name)
       call check('a change of '//name//' is seen and named', first_change(each, s) == name)
       call check('a change of '//name//' alters the checksum', checksum(s) /= before)
-      call make_sample(0.5_wp, .false., s)
+      call make_sample(0.5_wp, s)
     end do
     call check('equal states are equal', first_change(each, s) == 'nothing')
     call check('equal states have equal checksums', checksum(s) == before)
   end subroutine test_every_change_shows
 
   function checksum(s) result(text)
-    type(sample_t), intent(inout) :: s
+    type(world_t), intent(inout) :: s
     character(:), allocatable :: text
     type(state_list_t) :: list
 
@@ -52,7 +59,7 @@ contains
 
   !> Change number i of the list of all things that a run must remember.
   subroutine change(s, i, name)
-    type(sample_t), intent(inout) :: s
+    type(world_t), intent(inout) :: s
     integer, intent(in) :: i
     character(:), allocatable, intent(out) :: name
     integer :: at(3), top(3)
@@ -107,13 +114,13 @@ contains
 
   !> The sum over the blocks of all processes is that of the domain; exchanged elements show.
   subroutine test_checksum_of_cells()
-    type(sample_t), target :: s
+    type(world_t), target :: s
     type(grid_t), target :: whole
     type(state_list_t) :: list, of_whole
     real(wp), allocatable, target :: a(:, :, :, :)
     integer(i8) :: all_cells(2)
 
-    call make_sample(0.0_wp, .false., s)
+    call make_sample(0.0_wp, s)
     whole = s%grid
     call whole%own([1, 1, 1], whole%n)
     allocate (a(whole%first(1):whole%last(1), whole%first(2):whole%last(2), &
@@ -133,11 +140,11 @@ contains
 
   !> The parts of all processes cover every face of the domain once.
   subroutine test_owned_faces()
-    type(sample_t), target :: s
+    type(world_t), target :: s
     type(state_list_t) :: list
     integer :: first(3), last(3)
 
-    call make_sample(0.0_wp, .false., s)
+    call make_sample(0.0_wp, s)
     list%grid => s%grid
     call list%add('uf', 'm/s', s%flow%uf, on_faces=.true.)
     call list%item(1)%part(s%grid, 3, first, last)
@@ -145,5 +152,130 @@ contains
       s%grid%hi(3) == s%grid%n(3)))
     call check('those of x at the last cell', last(1), s%grid%hi(1))
   end subroutine test_owned_faces
+
+  !> The room asked for before a restart file is written is enough, and not much too large.
+  subroutine test_size()
+    type(world_t) :: s
+    type(state_list_t) :: list
+    character(:), allocatable :: parameters, message
+    integer(i8) :: there, capacity
+    integer :: info, unit
+
+    call make_sample(0.5_wp, s)
+    parameters = parameters_text(s%case)
+    call write_restart('sample.h5', s%case%text, parameters, s%run_state_t, info, message)
+    call check('a restart file is written', info, 0)
+    call list_state(s%run_state_t, list)
+    if (.not. is_root()) return
+    capacity = list%bytes() + len(s%case%text) + len(parameters) + bytes_for_change
+    open (newunit=unit, file='sample.h5', status='old')
+    inquire (unit, size=there)
+    close (unit, status='delete')
+    call check('a restart file fits into the room asked for', there <= capacity)
+    call check('the room is not much too large', capacity <= 2*there)
+  end subroutine test_size
+
+  !> A small tank with three blocks; `start` moves every number of the state.
+  subroutine make_sample(start, s)
+    real(wp), intent(in) :: start
+    type(world_t), intent(out) :: s
+    real(wp), parameter :: q(4) = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+    integer :: b
+
+    call set_up('&run t_end=2/ &grid cells=16,6,20 length=.16,.06,.2/ &shape name="block" ' &
+      //'kind="box" size=.02,.015,.01/ &shape name="hexapod" kind="hexapod" size=.01/ ' &
+      //body('block', [0.04_wp, 0.03_wp, 0.1_wp], q=q, more='fixed=T') &
+      //body('block', [0.08_wp, 0.03_wp, 0.1_wp], q=q) &
+      //body('hexapod', [0.12_wp, 0.03_wp, 0.1_wp], q=q, more='release_time=1.5'), s)
+    s%clock%t = 1.25_wp
+    s%clock%dt = 0.01_wp
+    s%clock%step = 130
+    s%clock%rows%n = 131
+    s%clock%frames%n = 13
+    call fill_cells(start + 0.1_wp, s%grid, 3, s%flow%u)
+    call fill_cells(start + 0.2_wp, s%grid, 1, s%flow%p)
+    call fill_cells(start + 0.3_wp, s%grid, 3, s%flow%uf)
+    call fill_cells(start + 0.4_wp, s%grid, 3, s%flow%solid_flux)
+    call fill_cells(start + 0.5_wp, s%grid, 1, s%flow%liquid)
+    call fill_cells(start + 0.6_wp, s%grid, 1, s%flow%fluid_volume)
+    call fill_cells(start + 0.7_wp, s%grid, 1, s%flow%c)
+    call fill_cells(start + 0.8_wp, s%grid, 1, s%solid%alpha)
+    call fill_cells(start + 0.9_wp, s%grid, 3, s%solid%aperture)
+    s%flow%liquid_initial = start + 1.0_wp
+    s%flow%liquid_inflow = start + 2.0_wp
+    do b = 1, s%blocks%n
+      s%blocks%v(:, b) = start + [0.1_wp, 0.2_wp, 0.3_wp]*b
+      s%blocks%contact_force(:, b) = start + [1.1_wp, 1.2_wp, 1.3_wp]*b
+      s%blocks%contacts(b) = b
+    end do
+    call fill_displacements(start, 4, s%contacts%displacements)
+    call fill_displacements(2*start, 3, s%contacts%sleep%frozen)
+    s%contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
+  end subroutine make_sample
+
+  !> The first n of four.
+  subroutine fill_displacements(start, n, s)
+    real(wp), intent(in) :: start
+    integer, intent(in) :: n
+    type(displacements_t), intent(inout) :: s
+    integer :: i
+
+    s%n = n
+    s%a = [2, 2, 3, 3]
+    s%b = [1, -1, 1, 2]
+    s%id = [7, 8, 9, 10]
+    s%k = [(start + 0.1_wp*i, i=1, 4)]
+    s%energy = 3*s%k
+    s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
+    s%force = 2*s%xi
+    s%torque_a = 3*s%xi
+    s%torque_b = 4*s%xi
+  end subroutine fill_displacements
+
+  !> Fill an array, halo included, with numbers that tell the cell.
+  subroutine fill_cells(start, grid, m, a)
+    real(wp), intent(in) :: start
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: m
+    real(wp), intent(out) &
+      :: a(grid%first(1):grid%last(1), grid%first(2):grid%last(2), grid%first(3):grid%last(3), m)
+    integer :: i, j, k, d
+
+    do concurrent (d=1:m, k=grid%first(3):grid%last(3), &
+      j=grid%first(2):grid%last(2), i=grid%first(1):grid%last(1))
+      a(i, j, k, d) = start + sin(1.0_wp*i + 100.0_wp*j + 10000.0_wp*k + 0.37_wp*d)
+    end do
+  end subroutine fill_cells
+
+  !> A checksum of each item of the state; all processes call.
+  function checksums_of(s) result(text)
+    type(world_t), intent(inout) :: s
+    character(18), allocatable :: text(:)
+    type(state_list_t) :: list
+    type(checksum_t) :: sum
+    integer :: i
+
+    call list_state(s%run_state_t, list)
+    allocate (text(list%n))
+    do i = 1, list%n
+      sum = checksum_t()
+      call list%item(i)%add_to_checksum(list%grid, sum)
+      text(i) = sum%text()
+    end do
+  end function checksums_of
+
+  !> Name of the first item whose checksum has changed, or 'nothing'.
+  function first_change(before, s) result(name)
+    character(18), intent(in) :: before(:)   !! of `checksums_of`
+    type(world_t), intent(inout) :: s
+    character(:), allocatable :: name
+    type(state_list_t) :: list
+    integer :: i
+
+    call list_state(s%run_state_t, list)
+    i = findloc(checksums_of(s) /= before, .true., 1)
+    name = 'nothing'
+    if (i > 0) name = list%item(i)%name
+  end function first_change
 
 end module test_state_m
