@@ -2,7 +2,8 @@
 module test_cut_cell_m
   use check_m, only: check, wp
   use solid_geometry_m, only: solid_geometry_t
-  use box_solid_m, only: set_tetrahedra
+  use grid_m, only: grid_t
+  use box_solid_m, only: simple_grid, set_boxes
   use plic_m, only: unit_volume, unit_slab
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below, open_constant, &
                         open_slab_below
@@ -25,16 +26,18 @@ contains
     call cell_without_open_part()
   end subroutine test_cut_cell
 
-  !> A box as six tetrahedra around its diagonal; a..b in shares of the cell.
+  !> A box from a to b, in shares of the cell; half of it is put there, then doubled, so that it may
+  !! fill all.
   subroutine set_box(a, b, solid)
     real(wp), intent(in) :: a(3), b(3)
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: t
+    type(grid_t) :: grid
 
-    allocate (solid%tets%corner(3, 4, 6))
-    call set_tetrahedra(reshape(low + h*a, [3, 1]), reshape(low + h*b, [3, 1]), solid)
-    solid%tets%first = [1, 7]
-    solid%tets%list = [(t, t=1, 6)]
+    call simple_grid([1, 1, 1], h, grid)
+    grid%origin = low
+    call set_boxes(grid, low + 0.5_wp*h*a, low + 0.5_wp*h*b, solid)
+    solid%tets%corner = 2*solid%tets%corner &
+      - spread(spread(low, 2, 4), 3, size(solid%tets%corner, 3))
   end subroutine set_box
 
   subroutine box_in_cell(a, b, name)
