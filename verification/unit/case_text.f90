@@ -1,4 +1,4 @@
-!> Cases, grids and groups of a case as text.
+!> Cases, grids, shapes and groups of a case as text.
 module case_text_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
@@ -6,9 +6,11 @@ module case_text_m
   use case_types_m, only: case_t
   use case_input_m, only: read_case
   use grid_m, only: grid_t, grid_init
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
   implicit none
   private
-  public :: case_of, grid_of, sides, body, slip
+  public :: case_of, grid_of, shape_of, sides, body, slip
 
   !> A tank with slip walls all round.
   character(*), parameter :: slip = '&boundary x_min="slip" x_max="slip" y_min="slip" ' &
@@ -40,6 +42,18 @@ contains
     case = case_of(text)
     call grid_init(case%grid, case%boundary, grid)
   end subroutine grid_of
+
+  !> The shape of a group &shape with these variables.
+  function shape_of(variables) result(shape)
+    character(*), intent(in) :: variables
+    type(shape_t) :: shape
+    type(case_t) :: case
+    character(:), allocatable :: message
+
+    case = case_of('&grid cells=3*2 length=3*1/ &shape name="s" '//variables//'/')
+    call make_shape(case%shape(1), shape, message)
+    if (len(message) > 0) error stop 'case_text_m: the shape is refused'
+  end function shape_of
 
   !> The group &boundary of six kinds, x_min first.
   function sides(kinds) result(text)

@@ -2,10 +2,11 @@
 module surface_nets_m
   use kinds_m, only: wp
   use vectors_m, only: cross
+  use tet_mesh_m, only: shape_t
   use check_m, only: check
   implicit none
   private
-  public :: check_net, moments_of_net
+  public :: check_net, check_moments
 
 contains
 
@@ -56,6 +57,22 @@ contains
     if (present(volume)) call check(name//': volume within', found, volume, 1.0e-13_wp*volume)
     if (present(area)) call check(name//': area', sum_area, area, 1.0e-13_wp*area)
   end subroutine check_net
+
+  !> Volume and inertia of a block are those by its surface, without tetrahedra.
+  subroutine check_moments(name, s)
+    character(*), intent(in) :: name
+    type(shape_t), intent(in) :: s
+    real(wp) :: volume, second(3, 3), inertia(3, 3)
+    integer :: j
+
+    call moments_of_net(s%point, s%facet, s%facet_point, volume, second)
+    inertia = -s%density*second
+    do j = 1, 3
+      inertia(j, j) = inertia(j, j) + s%density*(second(1, 1) + second(2, 2) + second(3, 3))
+    end do
+    call check(name//': volume by the surface', s%volume, volume, 1e-13_wp*volume)
+    call check(name//': inertia by the surface', [s%inertia], [inertia], 1e-13_wp*maxval(inertia))
+  end subroutine check_moments
 
   !> Volume and integral of x x^T within: with div(x f) = (3 + m) f for f of degree m,
   !! V = 1/3 sum (x.n) A and int x x^T dV = 1/5 sum (x.n) int x x^T dA.

@@ -2,11 +2,9 @@
 !! point from such a cube in closed form.
 module two_cubes_m
   use kinds_m, only: wp
-  use case_types_m, only: shape_input_t
+  use case_text_m, only: shape_of
   use random_counter_m, only: uniform, random_rotation
   use vectors_m, only: rotation_matrix, quaternion_exp, quaternion_product
-  use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t
   use bed_m, only: bed_counterpart
@@ -23,15 +21,8 @@ contains
   subroutine make_solid(kind, surface)
     character(*), intent(in) :: kind
     type(surface_t), intent(out) :: surface
-    type(shape_input_t) :: input
-    type(shape_t) :: shape
-    character(:), allocatable :: message
 
-    input%kind = kind
-    input%size = 1.0_wp
-    call make_shape(input, shape, message)
-    if (message /= '') error stop 'two_cubes_m: the shape cannot be built'
-    call surface_init(shape, surface)
+    call surface_init(shape_of('size=1 kind="'//kind//'"'), surface)
   end subroutine make_solid
 
   !> Number i of many poses: b turned at random, its centre at some distance from that of a.

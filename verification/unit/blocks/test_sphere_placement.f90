@@ -1,10 +1,10 @@
 !> Contact spheres: heights of a hexapod at rest, spheres inside the block, and their spacing.
 module test_sphere_placement_m
   use check_m, only: check, wp
-  use case_types_m, only: shape_input_t
+  use errors_m, only: to_text
+  use case_text_m, only: shape_of
   use vectors_m, only: cross
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
   use contact_sphere_placement_m, only: height_errors
   implicit none
   private
@@ -27,21 +27,13 @@ contains
     call spacing()
   end subroutine test_sphere_placement
 
-  subroutine build(kind, spheres, refinement, spacing, s)
-    character(*), intent(in) :: kind, spheres
-    integer, intent(in) :: refinement
-    real(wp), intent(in) :: spacing
+  !> A hexapod of cubes of that edge, or another shape three times as large.
+  subroutine build(variables, s)
+    character(*), intent(in) :: variables   !! of &shape
     type(shape_t), intent(out) :: s
-    type(shape_input_t) :: input
-    character(:), allocatable :: message
 
-    input%kind = kind
-    input%size = merge(d, 3*d, kind == 'hexapod')
-    input%spheres = spheres
-    input%refinement = refinement
-    input%sphere_spacing = spacing
-    call make_shape(input, s, message)
-    call check(kind//' with spheres '//spheres//message, len(message) == 0)
+    s = shape_of(variables//' size='//trim(merge('.02    ', merge('.06,.06', '.06    ', &
+      index(variables, 'cylinder') > 0), index(variables, 'hexapod') > 0)))
   end subroutine build
 
   !> Height of the centroid over a floor below direction -u, by the spheres [m].
@@ -64,13 +56,13 @@ contains
     type(shape_t) :: s
     real(wp) :: lowest, highest
 
-    call build('hexapod', 'centroid', 1, 0.0_wp, s)
+    call build('kind="hexapod" spheres="centroid" refinement=1', s)
     call check('centroid 1: heights', heights(s), [31.83e-3_wp, 28.04e-3_wp, 27.04e-3_wp], 5e-6_wp)
     call check('they differ from the true ones', any(abs(heights(s) - true_heights) > 1.5e-3_wp))
     call height_errors(s, lowest, highest)
     call check('warned of: too low', lowest < minval(heights(s) - true_heights) + 1e-4_wp)
     call check('warned of: beyond it', highest > maxval(heights(s) - true_heights) - 3e-4_wp)
-    call build('sphere', 'centroid', 1, 0.0_wp, s)
+    call build('kind="sphere" refinement=1', s)
     call height_errors(s, lowest, highest)
     call check('sphere: no warning', [lowest, highest], [0.0_wp, 0.0_wp])
   end subroutine centroid_heights
@@ -82,7 +74,7 @@ contains
     integer :: t, m, a
     integer, parameter :: others(3, 4) = reshape([2, 3, 4, 1, 3, 4, 1, 2, 4, 1, 2, 3], [3, 4])
 
-    call build('tetrapod', 'inscribed', 2, 0.0_wp, s)
+    call build('kind="tetrapod" spheres="inscribed" refinement=2', s)
     m = 0
     do t = 1, size(s%tet, 2)
       if (.not. any(s%triangle_tet == t)) cycle
@@ -97,7 +89,7 @@ contains
       end do
     end do
     call check('inscribed: one for each tetrahedron at the surface', size(s%sphere_radius), m)
-    call build('hexapod', 'inscribed', 1, 0.0_wp, s)
+    call build('kind="hexapod" spheres="inscribed" refinement=1', s)
     call check('inscribed 1: heights', heights(s), [30.00e-3_wp, 26.53e-3_wp, 25.77e-3_wp], 5e-6_wp)
   end subroutine inscribed_spheres
 
@@ -108,7 +100,7 @@ contains
     integer :: r
 
     do r = 1, 2
-      call build('hexapod', 'dense', r, 0.0_wp, s)
+      call build('kind="hexapod" spheres="dense" refinement='//to_text(r), s)
       h = heights(s)
       call check('hexapod, dense: heights', h, true_heights, 0.5e-3_wp)
       call check('hexapod, dense: order of the heights', h(2) < h(3) .and. h(3) < h(1))
@@ -129,7 +121,7 @@ contains
     integer :: m, i, k
     integer, parameter :: n = 8   ! samples along each edge of a triangle
 
-    call build(trim(kind), 'dense', 1, 0.0_wp, s)
+    call build('kind="'//trim(kind)//'" spheres="dense" refinement=1', s)
     a = 0.1_wp*s%smallest_edge
     out = 0.0_wp
     gap = 0.0_wp
@@ -152,25 +144,17 @@ contains
                (sqrt(0.375_wp) - 0.25_wp)*a*1.02_wp)
   end subroutine dense_inside
 
-  !> The number of balls goes with the inverse square of the spacing; too many are refused.
+  !> The number of balls goes with the inverse square of the spacing.
   subroutine spacing()
     type(shape_t) :: s
-    type(shape_input_t) :: input
-    character(:), allocatable :: message
-    integer :: n(2)
+    integer :: n(2), i
 
-    call build('hexapod', 'dense', 1, 0.002_wp, s)
-    n(1) = size(s%sphere_radius)
-    call build('hexapod', 'dense', 1, 0.001_wp, s)
-    n(2) = size(s%sphere_radius)
+    do i = 1, 2
+      call build('kind="hexapod" spheres="dense" refinement=1 sphere_spacing=' &
+        //to_text(0.002_wp/i), s)
+      n(i) = size(s%sphere_radius)
+    end do
     call check('half the spacing, four times the balls', real(n(2), wp)/n(1), 4.0_wp, 0.6_wp)
-    input%kind = 'hexapod'
-    input%size = d
-    input%spheres = 'dense'
-    input%sphere_spacing = 1.0e-4_wp
-    call make_shape(input, s, message)
-    call check('too many spheres: '//message, message == &
-      'sphere_spacing = 0.0001: about 1200000 contact spheres, at most 20000')
   end subroutine spacing
 
 end module test_sphere_placement_m

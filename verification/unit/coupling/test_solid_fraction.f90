@@ -1,7 +1,8 @@
 !> Bodies in the grid: volumes, shares by cut tetrahedra, degenerate poses, links, pockets, periods.
 module test_solid_fraction_m
   use check_m, only: check, wp, pi
-  use case_types_m, only: shape_input_t
+  use errors_m, only: to_text
+  use case_text_m, only: shape_of
   use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
   use random_counter_m, only: uniform, random_rotation
   use box_solid_m, only: simple_grid
@@ -9,11 +10,11 @@ module test_solid_fraction_m
   use grid_m, only: grid_t, n_halo, unit_step
   use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, polyhedron_moments
   use polyhedron_sections_m, only: polyhedron_section
-  use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use links_on_grid_m, only: links_t, links_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use cut_tets_m, only: faces_of_tet
   implicit none
   private
   public :: test_solid_fraction
@@ -34,6 +35,7 @@ contains
     call random_poses('tetrapod', [60, 20, 40], 40)
     call random_poses('dolos', [60, 20, 40], 40)
     call random_poses('reef_cube', [60, 20, 40], 40)
+    call faces_look_outward()
     call against_tetrahedra()
     call faces_on_grid_planes()
     call both_sides_alike()
@@ -77,21 +79,15 @@ contains
     real(wp), intent(in) :: size(:), x(:)        !! [m], 3 for each body [m]
     real(wp), intent(in), optional :: q(4)       !! attitude
     type(blocks_t) :: fresh
-    type(shape_input_t) :: input
-    character(:), allocatable :: message
 
     blocks = fresh
-    input%kind = kind
-    input%size(:ubound(size, 1)) = size
     blocks%n = ubound(x, 1)/3
-    allocate (blocks%shapes(1))
+    blocks%shapes = [shape_of('kind="'//kind//'" size='//to_text(size))]
     blocks%shape = spread(1, 1, blocks%n)
     blocks%present = spread(.true., 1, blocks%n)
     blocks%x = reshape(x, [3, blocks%n])
     blocks%q = spread(identity, 2, blocks%n)
     if (present(q)) blocks%q(:, 1) = q
-    call make_shape(input, blocks%shapes(1), message)
-    call check('the '//kind//' is built', message == '')
   end subroutine put
 
   subroutine fill()
@@ -117,7 +113,8 @@ contains
     integer :: p, m, k
 
     call tank(n, length)
-    call put(kind, [merge(d, 2*d, kind == 'hexapod'), 2*d], 0.5_wp*length)
+    call put(kind, [merge(d, 2*d, kind == 'hexapod'), spread(2*d, 1, merge(1, 0, kind &
+      == 'cylinder'))], 0.5_wp*length)
     call solid_geometry_init(grid, solid, 1)
     call solid_fraction_init(grid, blocks, fraction)
     worst = 0.0_wp
@@ -163,6 +160,24 @@ contains
     q = quaternion_product(quaternion_from_axis(axis(:, 1), real(mod(m, 4), wp)*pi/2), &
       quaternion_from_axis(axis(:, 3), real(mod(m/4, 4), wp)*pi/2))
   end function quarter_turns
+
+  !> Corners lie on the inner side of all faces, also of a tetrahedron turned inside out.
+  subroutine faces_look_outward()
+    real(wp), parameter :: corner(3, 4) = 0.1_wp*reshape([1, 2, 0, 14, 1, 3, 2, 11, 2, 3, 4, 17], &
+      [3, 4])
+    real(wp) :: n(3, 4), d(4), x(3, 4)
+    integer :: s, f
+
+    do s = 1, 2
+      x = corner
+      if (s == 2) x = corner(:, [2, 1, 3, 4])
+      call faces_of_tet(x, n, d)
+      call check('the middle is inside', all(matmul(sum(x, 2)/4, n) < d))
+      call check('corners are on the faces', all(matmul(transpose(x), n) <= spread(d, 1, 4)))
+      call check('a mirrored corner is outside', all([(dot_product(2*(sum(x, 2) - x(:, f))/3 &
+        - x(:, f), n(:, f)) > d(f), f=1, 4)]))
+    end do
+  end subroutine faces_look_outward
 
   !> Every cell and face against the sum of the clipped tetrahedra of the fine mesh.
   subroutine against_tetrahedra()

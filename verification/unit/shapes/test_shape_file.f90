@@ -2,6 +2,7 @@
 module test_shape_file_m
   use check_m, only: check, wp
   use case_types_m, only: shape_input_t
+  use case_text_m, only: shape_of
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_volume
   use shapes_builtin_m, only: make_shape
@@ -39,15 +40,12 @@ contains
   subroutine round_trip(kind, facets)
     character(*), intent(in) :: kind
     integer, intent(in) :: facets   !! flat convex regions of the surface; < 0: as built
-    type(shape_input_t) :: input
     type(shape_t) :: built, found
     character(:), allocatable :: message
     character(8), parameter :: files(3) = ['own.txt ', 'gmsh.msh', 'gm41.msh']
     integer :: f, t, n
 
-    input%kind = kind
-    input%size = 0.02_wp
-    call make_shape(input, built, message)
+    built = shape_of('size=.02 kind="'//kind//'"')
     call write_own(files(1), built)
     call write_gmsh_22(files(2), built)
     call write_gmsh_41(files(3), built)
@@ -75,18 +73,15 @@ contains
   subroutine write_own(file, s)
     character(*), intent(in) :: file
     type(shape_t), intent(in) :: s
-    integer :: unit, i
+    integer :: unit, i, n
 
+    n = size(s%tet, 2)
     open (newunit=unit, file=file, status='replace')
     write (unit, '(a, /, a, i0)') 'mics-shape 1', 'points ', size(s%point, 2) + 1
-    do i = 1, size(s%point, 2)
-      write (unit, '(3es25.16)') 1000*s%point(:, i) + [7, 8, 9]
-    end do
-    write (unit, '(a, /, a, i0)') '0 0 0', 'tets ', size(s%tet, 2)
-    do i = 1, size(s%tet, 2)
-      if (mod(i, 2) == 0) write (unit, '(4(1x, i0))') s%tet(:, i)
-      if (mod(i, 2) == 1) write (unit, '(4(1x, i0))') s%tet([2, 1, 3, 4], i)
-    end do
+    write (unit, '(3es25.16)') (1000*s%point(:, i) + [7, 8, 9], i=1, size(s%point, 2))
+    write (unit, '(a, /, a, i0)') '0 0 0', 'tets ', n
+    write (unit, '(4(1x, i0))') (merge(s%tet(:, i), s%tet([2, 1, 3, 4], i), mod(i, 2) == 0), &
+      i=1, n)
     close (unit)
   end subroutine write_own
 
@@ -96,63 +91,46 @@ contains
     type(shape_t), intent(in) :: s
     integer :: unit, i
 
-    open (newunit=unit, file=file, status='replace')
-    write (unit, '(a)') '$MeshFormat', '2.2 0 8', '$EndMeshFormat', '$PhysicalNames', '1', &
-      '3 1 "the block"', '$EndPhysicalNames', '$Nodes'
-    write (unit, '(i0)') size(s%point, 2)
-    do i = 1, size(s%point, 2)
-      write (unit, '(i0, 3es25.16)') 3*i, 1000*s%point(:, i) - [7, 8, 9]
-    end do
-    write (unit, '(a, /, a)') '$EndNodes', '$Elements'
-    write (unit, '(i0)') size(s%tet, 2) + size(s%triangle, 2)
-    do i = 1, size(s%triangle, 2)
-      write (unit, '(8(1x, i0))') i, 2, 2, 1, 1, 3*s%triangle(:, i)
-    end do
-    do i = 1, size(s%tet, 2)
-      write (unit, '(9(1x, i0))') 100000 + i, 4, 2, 1, 1, 3*s%tet(:, i)
-    end do
-    write (unit, '(a)') '$EndElements'
-    close (unit)
+    associate (n => size(s%point, 2), n_tri => size(s%triangle, 2), n_tet => size(s%tet, 2))
+      open (newunit=unit, file=file, status='replace')
+      write (unit, '(a)') '$MeshFormat', '2.2 0 8', '$EndMeshFormat', '$PhysicalNames', '1', &
+        '3 1 "the block"', '$EndPhysicalNames', '$Nodes'
+      write (unit, '(i0)') n
+      write (unit, '(i0, 3es25.16)') (3*i, 1000*s%point(:, i) - [7, 8, 9], i=1, n)
+      write (unit, '(a, /, a, /, i0)') '$EndNodes', '$Elements', n_tet + n_tri
+      write (unit, '(8(1x, i0))') (i, 2, 2, 1, 1, 3*s%triangle(:, i), i=1, n_tri)
+      write (unit, '(9(1x, i0))') (100000 + i, 4, 2, 1, 1, 3*s%tet(:, i), i=1, n_tet)
+      write (unit, '(a)') '$EndElements'
+      close (unit)
+    end associate
   end subroutine write_gmsh_22
 
-  !> Points in two blocks, the second with parameters; tetrahedra in two blocks.
+  !> Points in two blocks, the first with parameters; tetrahedra in two blocks.
   subroutine write_gmsh_41(file, s)
     character(*), intent(in) :: file
     type(shape_t), intent(in) :: s
-    integer :: unit, i, n, half
+    integer :: unit, i
 
-    n = size(s%point, 2)
-    open (newunit=unit, file=file, status='replace')
-    write (unit, '(a)') '$MeshFormat', '4.1 0 8', '$EndMeshFormat', '$Entities', '0 0 0 1', &
-      '1 0 0 0 1 1 1 0 0', '$EndEntities', '$Nodes'
-    write (unit, '(4(1x, i0))') 2, n, 1, n, 2, 1, 1, n - 3
-    do i = 4, n
-      write (unit, '(i0)') i
-    end do
-    do i = 4, n
-      write (unit, '(3es25.16, a)') 1000*s%point(:, i), ' 0.25 0.75'
-    end do
-    write (unit, '(4(1x, i0))') 3, 1, 0, 3, 1, 2, 3
-    do i = 1, 3
-      write (unit, '(3es25.16)') 1000*s%point(:, i)
-    end do
-    half = size(s%tet, 2)/2
-    write (unit, '(a, /, a)') '$EndNodes', '$Elements'
-    write (unit, '(4(1x, i0))') 3, size(s%triangle, 2) + size(s%tet, 2), 1, 9, 2, 1, 2, &
-      size(s%triangle, 2)
-    do i = 1, size(s%triangle, 2)
-      write (unit, '(8(1x, i0))') i, s%triangle(:, i)
-    end do
-    write (unit, '(4(1x, i0))') 3, 1, 4, half
-    do i = 1, half
-      write (unit, '(8(1x, i0))') i, s%tet(:, i)
-    end do
-    write (unit, '(4(1x, i0))') 3, 2, 4, size(s%tet, 2) - half
-    do i = half + 1, size(s%tet, 2)
-      write (unit, '(8(1x, i0))') i, s%tet(:, i)
-    end do
-    write (unit, '(a)') '$EndElements'
-    close (unit)
+    associate (n => size(s%point, 2), n_tri => size(s%triangle, 2), n_tet => size(s%tet, 2), &
+      half => size(s%tet, 2)/2)
+      open (newunit=unit, file=file, status='replace')
+      write (unit, '(a)') '$MeshFormat', '4.1 0 8', '$EndMeshFormat', '$Entities', '0 0 0 1', &
+        '1 0 0 0 1 1 1 0 0', '$EndEntities', '$Nodes'
+      write (unit, '(4(1x, i0))') 2, n, 1, n, 2, 1, 1, n - 3
+      write (unit, '(i0)') (i, i=4, n)
+      write (unit, '(3es25.16, a)') (1000*s%point(:, i), ' 0.25 0.75', i=4, n)
+      write (unit, '(4(1x, i0))') 3, 1, 0, 3, 1, 2, 3
+      write (unit, '(3es25.16)') 1000*s%point(:, :3)
+      write (unit, '(a, /, a)') '$EndNodes', '$Elements'
+      write (unit, '(4(1x, i0))') 3, n_tri + n_tet, 1, 9, 2, 1, 2, n_tri
+      write (unit, '(8(1x, i0))') (i, s%triangle(:, i), i=1, n_tri)
+      write (unit, '(4(1x, i0))') 3, 1, 4, half
+      write (unit, '(8(1x, i0))') (i, s%tet(:, i), i=1, half)
+      write (unit, '(4(1x, i0))') 3, 2, 4, n_tet - half
+      write (unit, '(8(1x, i0))') (i, s%tet(:, i), i=half + 1, n_tet)
+      write (unit, '(a)') '$EndElements'
+      close (unit)
+    end associate
   end subroutine write_gmsh_41
 
   !> The surface net of a block from a file is closed, convex, and bends at every corner, also
@@ -161,14 +139,10 @@ contains
     type(shape_t) :: s
     character(:), allocatable :: message
     character(9), parameter :: kinds(3) = ['dolos    ', 'reef_cube', 'hexapod  ']
-    type(shape_input_t) :: input
     integer :: i
 
     do i = 1, 3
-      input%kind = kinds(i)
-      input%size = 0.02_wp
-      call make_shape(input, s, message)
-      call write_own('own', s)
+      call write_own('own', shape_of('size=.02 kind="'//trim(kinds(i))//'"'))
       call read_file('own', 1.0e-3_wp, s, message)
       call check_net(trim(kinds(i)), s%point, s%facet, s%facet_point, volume=s%volume)
     end do

@@ -1,11 +1,11 @@
 !> The built-in shapes: closed conforming meshes, symmetry, contact spheres, messages.
 module test_shapes_m
   use check_m, only: check, wp, pi
-  use case_types_m, only: shape_input_t
+  use errors_m, only: to_text
+  use case_text_m, only: shape_of
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_volume
-  use shapes_builtin_m, only: make_shape
-  use surface_nets_m, only: check_net
+  use surface_nets_m, only: check_net, check_moments
   implicit none
   private
   public :: test_shapes
@@ -15,53 +15,35 @@ module test_shapes_m
 contains
 
   subroutine test_shapes()
-    call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 1, 24)
-    call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, 144)
-    call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 3, -1)
-    call check_kind('cube', [0.03_wp, 0.0_wp, 0.0_wp], 1, 4)
-    call check_kind('box', [0.01_wp, 0.03_wp, 0.05_wp], 2, -1)
-    call check_kind('sphere', [0.06_wp, 0.0_wp, 0.0_wp], 1, 1)
-    call check_kind('sphere', [0.06_wp, 0.0_wp, 0.0_wp], 2, 1)
+    call check_kind('hexapod', 'size=.02 refinement=1', 24)
+    call check_kind('hexapod', 'size=.02 refinement=2', 144)
+    call check_kind('hexapod', 'size=.02 refinement=3', -1)
+    call check_kind('cube', 'size=.03 refinement=1', 4)
+    call check_kind('box', 'size=.01,.03,.05 refinement=2', -1)
+    call check_kind('sphere', 'size=.06 refinement=1', 1)
+    call check_kind('sphere', 'size=.06 refinement=2', 1)
     do r = 1, 4
-      call check_kind('cylinder', [0.03_wp, 0.05_wp, 0.0_wp], r, -1)
-      call check_kind('tetrapod', [0.06_wp, 0.0_wp, 0.0_wp], r, -1)
+      call check_kind('cylinder', 'size=.03,.05 refinement='//to_text(r), -1)
+      call check_kind('tetrapod', 'size=.06 refinement='//to_text(r), -1)
       if (r == 4) cycle
-      call check_kind('dolos', [0.06_wp, 0.0_wp, 0.0_wp], r, -1)
-      call check_kind('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, -1)
+      call check_kind('dolos', 'size=.06 refinement='//to_text(r), -1)
+      call check_kind('reef_cube', 'size=.05 refinement='//to_text(r), -1)
       call reef_cube_sizes()
     end do
     call hexapod_sizes()
     call hexapod_symmetry()
     call sphere_sizes()
-    call refusals()
   end subroutine test_shapes
 
-  subroutine build(kind, size, refinement, shape)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size(3)
-    integer, intent(in) :: refinement
-    type(shape_t), intent(out) :: shape
-    type(shape_input_t) :: input
-    character(:), allocatable :: message
-
-    input%name = kind
-    input%kind = kind
-    input%size = size
-    input%refinement = refinement
-    call make_shape(input, shape, message)
-    call check(kind//' is built', message == '')
-  end subroutine build
-
   !> Properties every mesh must have; `n_spheres` < 0 where the number is not stated.
-  subroutine check_kind(kind, size_m, refinement, n_spheres)
-    character(*), intent(in) :: kind
-    real(wp), intent(in) :: size_m(3)
-    integer, intent(in) :: refinement, n_spheres
+  subroutine check_kind(kind, variables, n_spheres)
+    character(*), intent(in) :: kind, variables   !! of &shape
+    integer, intent(in) :: n_spheres
     type(shape_t) :: s
     real(wp), allocatable :: volume(:)
     integer :: t, m
 
-    call build(kind, size_m, refinement, s)
+    s = shape_of('kind="'//kind//'" '//variables)
     allocate (volume, source=[(tet_volume(s%point(:, s%tet(:, t))), t=1, size(s%tet, 2))])
     call check(kind//': the tetrahedra fill the block', sum(volume), s%volume, &
                epsilon(1.0_wp)*real(size(s%tet, 2), wp)*s%volume)
@@ -73,6 +55,7 @@ contains
     call check_net(kind//', triangles', s%point, [(1 + 3*m, m=0, size(s%triangle, 2))], &
                    reshape(s%triangle, [size(s%triangle)]), volume=s%volume)
     call check_net(kind//', facets', s%point, s%facet, s%facet_point, volume=s%volume)
+    call check_moments(kind, s)
     call check(kind//': each surface triangle is a face of its tetrahedron', all([(all([( &
       any(s%tet(:, s%triangle_tet(m)) == s%triangle(t, m)), t=1, 3)]), m=1, size(s%triangle, 2))]))
     call check(kind//': centroid', weighted_centroid(s), [0.0_wp, 0.0_wp, 0.0_wp], 1e-15_wp)
@@ -115,7 +98,7 @@ contains
     type(shape_t) :: s
     real(wp), parameter :: d = 0.02_wp
 
-    call build('hexapod', [d, 0.0_wp, 0.0_wp], 2, s)
+    s = shape_of('kind="hexapod" size=.02 refinement=2')
     call check('hexapod: 280 tetrahedra', size(s%tet, 2), 280)
     call check('hexapod: 35 of them for the flow', size(s%flow_tet, 2), 35)
     call check('hexapod: 30 facets', size(s%facet) - 1, 30)
@@ -130,7 +113,7 @@ contains
     real(wp) :: x(3)
     integer :: m
 
-    call build('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, s)
+    s = shape_of('kind="hexapod" size=.02 refinement=2')
     do m = 1, size(s%sphere_radius)
       x = s%sphere_centre(:, m)
       call check('hexapod: a quarter turn', is_centre(s, [-x(2), x(1), x(3)]))
@@ -154,7 +137,7 @@ contains
     real(wp), parameter :: a = 0.03_wp
 
     do r = 1, 2
-      call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
+      s = shape_of('kind="sphere" size=.06 refinement='//to_text(r))
       call check('sphere: true volume', s%volume, 4*pi/3*a**3, 1e-13_wp*a**3)
       call check('sphere: 20 (2 r)^2 triangles', size(s%triangle, 2), 20*(2*r)**2)
       call check('sphere: contact points with its true radius', s%sphere_radius(1), a)
@@ -168,24 +151,9 @@ contains
   subroutine reef_cube_sizes()
     type(shape_t) :: s
 
-    call build('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, s)
+    s = shape_of('kind="reef_cube" size=.05 refinement='//to_text(r))
     call check('reef cube: facets', size(s%facet) - 1, 72)
     call check('edges', maxval(s%point, 2) - minval(s%point, 2), spread(0.05_wp, 1, 3), 1e-15_wp)
   end subroutine reef_cube_sizes
-
-  subroutine refusals()
-    type(shape_input_t) :: input
-    type(shape_t) :: s
-    character(:), allocatable :: message
-
-    input%size = 0.02_wp
-    input%kind = 'cubo'
-    call make_shape(input, s, message)
-    call check('unknown kind is refused', index(message, 'unknown') > 0)
-    input%kind = 'cube'
-    input%size(1) = -1.0_wp
-    call make_shape(input, s, message)
-    call check('negative size is refused', index(message, 'size') > 0)
-  end subroutine refusals
 
 end module test_shapes_m
