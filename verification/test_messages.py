@@ -34,6 +34,8 @@ STARTS = {
     "&grid cells = 4, 4, 4 length = 0.3, 0.3, 0.3 /\n",
     "basin": "&run t_end = 10 /\n&grid cells = 40, 40, 40 length = 4, 4, 4 /\n",
     "wide": "&run t_end = 1 physics = 'dry' /\n&grid cells = 6, 4, 5 length = 3*1e6 /\n",
+    "slice": RUN + "&grid cells = 10, 1, 10 length = 0.2, 0.5, 0.25 /\n"
+    "&boundary y_min = 'slip' y_max = 'slip' /\n",
     "head": HEAD,
     "nodes": HEAD + "$Nodes\n4\n1 0 0 0\n7 1 0 0\n9 0 1e-0 0\n4 0 0 1\n$EndNodes\n$Elements\n",
     "blocks": "$MeshFormat 4.1 0 8 $Nodes ",

@@ -265,6 +265,17 @@ def test_examples_and_defaults_fit_the_schema(schema: dict[str, Any]) -> None:
                 jsonschema.validate(value, rule)
 
 
+def test_an_unknown_name_ends_the_program(schema: dict[str, Any]) -> None:
+    """Who adds a choice and forgets a branch is told: a `select case` on it stops by default."""
+    pattern = r"select case \((?:trim\()?(?:\w+%)+(\w+)\)+\n((?:(?!end select).)*)end select"
+    source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.f90"))
+    stops = {name for name, body in re.findall(pattern, source, re.DOTALL)
+             if re.search(r"case default;?\s*error stop", body)}  # fmt: skip
+    choices = {name for group in schema["$defs"].values() for name, rule in
+               group["properties"].items() if "enum" in rule and name not in SIDES}  # fmt: skip
+    assert choices - stops == {"advection", "if_blocked", "release"}  # `scheme_of`; by `if`
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -8,37 +8,25 @@ module test_command_line_m
   public :: test_command_line
 
   type(options_t) :: options
-  type(problems_t) :: problems
 
 contains
 
   subroutine test_command_line()
-    call parse('--max-wall 12:30')
+    call parse([argument_t('--max-wall'), argument_t('12:30')])
     call check('hours and minutes', nint(options%max_wall), 45000)
-    call parse('--max-wall=0:00:07')
+    call parse([argument_t('--max-wall=0:00:07')])
     call check('seconds, too', nint(options%max_wall), 7)
-    call parse('')
+    call parse([argument_t ::])
     call check('how to go on with a case from standard input', &
       restart_command('./mics_mpi', 4, options, "my run/a's.h5") == 'mpirun -n 4 ./mics_mpi ' &
       //"--restart 'my run/a'\''s.h5' < CASE   (CASE: the case file, which came on standard input)")
   end subroutine test_command_line
 
-  !> Parse the words of a line.
-  subroutine parse(line)
-    character(*), intent(in) :: line
-    type(argument_t), allocatable :: arguments(:)
-    type(problems_t) :: none
-    integer :: first, last
+  subroutine parse(words)
+    type(argument_t), intent(in) :: words(:)
+    type(problems_t) :: problems
 
-    allocate (arguments(0))
-    first = 1
-    do while (first <= len(line))
-      last = index(line(first:)//' ', ' ') + first - 2
-      arguments = [arguments, argument_t(line(first:last))]
-      first = last + 2
-    end do
-    problems = none
-    call parse_arguments(arguments, options, problems)
+    call parse_arguments(words, options, problems)
   end subroutine parse
 
 end module test_command_line_m

@@ -55,7 +55,6 @@ contains
     call check_landing_cube()
     call check_landing_slab()
     if (solvers(model) == 'springs') call check_swinging_ball()
-    call check_incline_on_body()
     call check_stack()
     call check_momentum()
     call check_energy()
@@ -268,25 +267,6 @@ contains
       - 0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, &
       0.01_wp*energy)
   end subroutine check_swinging_ball
-
-  !> The same on a fixed body, spheres on spheres.
-  subroutine check_incline_on_body()
-    type(world_t) :: world
-    real(wp) :: slope, x(3)
-
-    slope = 0.3_wp
-    call start('friction=.6', tank//cube//slab//body('slab', middle, more='fixed=T') &
-      //body('cube', [0.503_wp, 0.501_wp, 0.5_wp + 1.2_wp*d]), world)
-    world%case%fluid%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
-    call move(world, 500, dt)
-    call check('lies on the slab', world%blocks%contacts(2), 1)
-    x = world%blocks%x(:, 2)
-    call move(world, 250, dt)
-    call check('does not creep on spheres', world%blocks%x(:, 2) - x, 0.0_wp, 1.0e-9_wp)
-    call check('the slab bears the cube', world%blocks%contact_force(:, 1) &
-      - world%blocks%mass(2)*world%case%fluid%gravity, 0.0_wp, 1.0e-4_wp)
-    call check('action and reaction', sum(world%blocks%contact_force, 2), 0.0_wp)
-  end subroutine check_incline_on_body
 
   !> Two cubes set one on the other come to rest; counterparts are counted; forces balance the
   !! weight.

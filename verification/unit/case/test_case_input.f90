@@ -17,42 +17,12 @@ module test_case_input_m
 contains
 
   subroutine test_case_input()
-    call test_defaults()
     call test_substeps()
     call test_values()
     call test_attitudes()
     call test_way_back()
     call test_rock()
   end subroutine test_case_input
-
-  !> What the contract promises for a case that says next to nothing.
-  subroutine test_defaults()
-    type(case_t) :: case
-    type(problems_t) :: problems
-
-    call read_case(base, case, problems)
-    call check('shortest case', problems%n, 0)
-    call check('text is kept', case%text == base)
-    call check('physics', case%run%physics == 'coupled')
-    call check('output', case%run%output == 'mics-out' .and. case%run%title == '')
-    call check('run', [case%run%dt, case%run%cfl_max, case%run%field_interval, &
-      case%run%history_interval, case%run%restart_interval, case%run%rest_speed, &
-      case%run%rest_time], [1.0e-2_wp, 0.5_wp, 0.1_wp, 0.0_wp, 1.0_wp, 1.0e-3_wp, 0.5_wp])
-    call check('cells', all(case%grid%cells == [6, 2, 4]))
-    call check('sides', all(case%boundary%kind(:, :2) == 'no_slip') &
-               .and. case%boundary%kind(1, 3) == 'no_slip' .and. case%boundary%kind(2, 3) == 'open')
-    call check('fluid', [case%fluid%liquid_density, case%fluid%liquid_viscosity, &
-      case%fluid%gas_density, case%fluid%gas_viscosity, case%fluid%gravity], &
-      [998.2_wp, 1.002e-3_wp, 1.204_wp, 1.82e-5_wp, 0.0_wp, 0.0_wp, -9.81_wp])
-    call check('no level', .not. is_given(case%fluid%water_level))
-    call check('numerics', case%numerics%momentum == 'conservative' &
-      .and. case%numerics%advection == 'mp5' .and. case%numerics%solid_fraction == 'exact' &
-      .and. case%numerics%pressure_solver == 'cg' .and. case%numerics%preconditioner == 'multigrid')
-    call check('contact', case%contact%model == 'surface' .and. case%contact%law == 'restitution' &
-               .and. case%contact%sleep)
-    call check('no ' &
-      //'groups', size(case%water) + size(case%shape) + size(case%body) + size(case%drop), 0)
-  end subroutine test_defaults
 
   !> A substep is a share of a step; in 'light' it may be one.
   subroutine test_substeps()

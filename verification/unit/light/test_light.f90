@@ -34,28 +34,19 @@ contains
     call check_resumed()
   end subroutine test_light
 
-  !> Cubes in the tank of the paper; `bodies` stand at heights z if they are not told.
-  subroutine start(density, world, z, bodies, shape, velocity)
+  !> Cubes in the tank of the paper.
+  subroutine start(density, world, bodies, shape, velocity)
     real(wp), intent(in) :: density    !! [kg/m3]
     type(world_t), intent(out) :: world
-    real(wp), intent(in), optional :: z(:)   !! of their centres [m]
-    character(*), intent(in), optional :: bodies, shape, velocity   !! groups; variables of &shape
-      !! and &fluid
+    character(*), intent(in) :: bodies   !! groups
+    character(*), intent(in), optional :: shape, velocity   !! variables of &shape and &fluid
     character(:), allocatable :: text
-    integer :: b
 
     text = head//'&fluid liquid_density=1000 water_level=.15'
     if (present(velocity)) text = text//velocity
     text = text//'/ &shape name="cube" kind="cube" size=.02 density='//to_text(density)
     if (present(shape)) text = text//shape
-    text = text//'/ '
-    if (present(bodies)) text = text//bodies
-    if (present(z)) then
-      do b = 1, size(z)
-        text = text//body('cube', [0.05_wp*real(b, wp), 0.05_wp, z(b)])
-      end do
-    end if
-    call set_up(text, world)
+    call set_up(text//'/ '//bodies, world)
   end subroutine start
 
   !> A cube in the middle at a height.
@@ -133,7 +124,7 @@ contains
     type(world_t) :: world
     real(wp) :: cut, want
 
-    call start(2300.0_wp, world, bodies=at(0.05_wp, more='fixed=T')//at(level, more='fixed=T') &
+    call start(2300.0_wp, world, at(0.05_wp, more='fixed=T')//at(level, more='fixed=T') &
       //at(0.06_wp, more='fixed=T release_time=1'))
     call enter(gravity, world)
     call check('the level of the start', world%light%level, level, 1.0e-15_wp)
@@ -157,7 +148,7 @@ contains
     real(wp), parameter :: dt = 1.0e-6_wp, s = 2.3_wp
     real(wp) :: want
 
-    call start(s*rho, world, [0.07_wp])
+    call start(s*rho, world, at(0.07_wp))
     call step(1, dt, world)
     want = -(s - 1.0_wp)*g/(s + world%light%added(1)%mass)
     call check('start of a fall', world%blocks%v(3, 1)/dt/want, 1.0_wp, 1.0e-5_wp)
@@ -173,7 +164,7 @@ contains
     real(wp), parameter :: s = 2.3_wp
     real(wp) :: want
 
-    call start(s*rho, world, bodies=at(-1.0_wp, q=quaternion_from_axis([1.0_wp, 2.0_wp, 0.5_wp], &
+    call start(s*rho, world, at(-1.0_wp, q=quaternion_from_axis([1.0_wp, 2.0_wp, 0.5_wp], &
       0.7_wp)))
     call step(4000, min(1.0e-3_wp, step_in_water(gravity, world%blocks, world%light)), world)
     want = sqrt(2.0_wp*(s - 1.0_wp)*g*edge**3/(0.55_wp*2.0_wp*edge**2))
@@ -185,13 +176,13 @@ contains
   subroutine check_in_balance()
     type(world_t) :: world
 
-    call start(0.5_wp*rho, world, [level])
+    call start(0.5_wp*rho, world, at(level))
     call step(1000, 1.0e-3_wp, world)
     call check('floats at half draught', world%blocks%x(3, 1), level, 1.0e-12_wp)
-    call start(rho, world, [0.07_wp])
+    call start(rho, world, at(0.07_wp))
     call step(1000, 1.0e-2_wp, world)
     call check('a neutral block stays', world%blocks%x(3, 1), 0.07_wp, 1.0e-13_wp)
-    call start(rho, world, [0.07_wp], velocity=' velocity=.2,0,0')
+    call start(rho, world, at(0.07_wp), velocity=' velocity=.2,0,0')
     call step(20000, 1.0e-3_wp, world)
     call check('neutral: with the current', world%blocks%v(1, 1)/0.2_wp, 1.0_wp, 2.0e-2_wp)
     call check('and no other way', norm2(world%blocks%v(2:3, 1)) < 1.0e-12_wp)
@@ -205,7 +196,7 @@ contains
     integer :: i, n
 
     do n = 40, 400, 360
-      call start(2300.0_wp, world, bodies=at(level + 0.6_wp*edge, [0.0_wp, 0.0_wp, fall]), &
+      call start(2300.0_wp, world, at(level + 0.6_wp*edge, [0.0_wp, 0.0_wp, fall]), &
         shape=' drag_coefficient=0')
         do i = 1, n
         call enter(0.0_wp*gravity, world)
@@ -227,7 +218,7 @@ contains
     type(world_t) :: world
     real(wp), parameter :: speed = -0.1_wp
 
-    call start(2300.0_wp, world, bodies=at(level + 0.5_wp*edge, [0.0_wp, 0.0_wp, speed], &
+    call start(2300.0_wp, world, at(level + 0.5_wp*edge, [0.0_wp, 0.0_wp, speed], &
       more='fixed=T'))
     call step(10, 1.0e-2_wp, world)
     call check('it is half in the water', world%light%wet(1) > 0.3_wp*edge**3 .and. &
@@ -246,7 +237,7 @@ contains
     real(wp), parameter :: spin = 5.0_wp
     real(wp) :: grown
 
-    call start(rho, world, bodies=at(0.07_wp, more='angular_velocity=0,0,5'))
+    call start(rho, world, at(0.07_wp, more='angular_velocity=0,0,5'))
     call enter(gravity, world)
     call step(1, 1.0e-9_wp, world)
     call check('release keeps the spin', world%blocks%omega(3, 1)/spin, 1.0_wp, 1.0e-6_wp)
@@ -271,13 +262,13 @@ contains
     real(wp) :: first, largest
     integer :: i
 
-    call start(1.5_wp*rho, world, bodies=at(0.12_wp, [0.1_wp, 0.0_wp, 0.3_wp], &
+    call start(1.5_wp*rho, world, at(0.12_wp, [0.1_wp, 0.0_wp, 0.3_wp], &
       more='angular_velocity=3,2,5'), shape=' drag_coefficient=0')
     call step(1, 1.0e-12_wp, world)
     first = energy(world)
     call step(50, 1.0e-3_wp, world)
     call check('energy under water stays', energy(world)/first, 1.0_wp, 1.0e-12_wp)
-    call start(0.9_wp*rho, world, [level - 0.35_wp*edge])   ! at rest at -0.4
+    call start(0.9_wp*rho, world, at(level - 0.35_wp*edge))   ! at rest at -0.4
     largest = 0.0_wp
     do i = 1, 1000
       call step(1, 1.0e-2_wp, world)
@@ -300,7 +291,7 @@ contains
     type(world_t) :: world
     real(wp) :: force
 
-    call start(2300.0_wp, world, [0.02_wp, level])
+    call start(2300.0_wp, world, at(0.02_wp)//at(level))
     call enter(gravity, world)
     world%blocks%asleep = .true.
     world%light%force(3, 1) = 7.0_wp   ! a mark: it must not be found anew
@@ -315,7 +306,7 @@ contains
   subroutine check_resumed()
     type(world_t) :: world, again
 
-    call start(2300.0_wp, world, [level + 0.4_wp*edge])
+    call start(2300.0_wp, world, at(level + 0.4_wp*edge))
     call step(30, 1.0e-3_wp, world)
     call begin(world%case, world, again)
     again%blocks%x = world%blocks%x

@@ -2,11 +2,7 @@
 module test_diagnostics_m
   use check_m, only: check, wp
   use case_types_m, only: case_t
-  use case_text_m, only: case_of
-  use grid_m, only: grid_init
-  use fields_m, only: flow_init
-  use solid_geometry_m, only: solid_geometry_init
-  use run_state_m, only: run_state_t
+  use world_m, only: world_t, set_up
   use diagnostics_m, only: step_report_t, quantity_t, make_row, value_of, measure_fluid, &
     energy_of_level
   implicit none
@@ -15,7 +11,7 @@ module test_diagnostics_m
 
   real(wp), parameter :: volume = 0.1_wp*0.2_wp*0.25_wp   !! of a cell [m3]
   type(case_t) :: case
-  type(run_state_t) :: state
+  type(world_t) :: state
   type(step_report_t) :: report
   type(quantity_t), allocatable :: row(:)
   real(wp) :: mass
@@ -23,14 +19,8 @@ module test_diagnostics_m
 contains
 
   subroutine test_diagnostics()
-    case = case_of('&grid cells=3*4 length=.4,.8,1/')
-    call grid_init(case%grid, case%boundary, state%grid)
-    call flow_init(state%grid, state%flow)
-    allocate (state%solid)
-    call solid_geometry_init(state%grid, state%solid, 0)
-    allocate (state%blocks%asleep(0))
-    state%solid%alpha = 0.0_wp
-    state%flow%u = 0.0_wp
+    call set_up('&grid cells=3*4 length=.4,.8,1/ &fluid water_level=.5/', state)
+    case = state%case
     state%flow%c = 1.0_wp      ! all of it under water,
     state%flow%liquid = 0.0_wp   ! as far as the surface around tells
     state%flow%rho = case%fluid%liquid_density
@@ -79,7 +69,7 @@ contains
 
   subroutine look()
     report%fluid = measure_fluid(case%fluid, state%grid, state%flow, state%solid)
-    row = make_row(case%fluid, 0.0_wp, state, report)
+    row = make_row(case%fluid, 0.0_wp, state%run_state_t, report)
   end subroutine look
 
   !> Potential energy of level liquid is that of a prism, less what a block displaces of it.

@@ -19,7 +19,6 @@ contains
     call test_attributes()
     call test_datasets()
     call test_columns()
-    call test_shared_blocks()
     call test_go_on_together()
     call test_room()
     call test_trouble()
@@ -183,51 +182,6 @@ contains
     first = 1 + (layers*my_rank())/nproc()
     last = (layers*(my_rank() + 1))/nproc()
   end subroutine own_layers
-
-  !> All processes write their layers of one dataset; what is read does not depend on their number.
-  subroutine test_shared_blocks()
-    type(table_t) :: table
-    real(wp) :: mine(2*layers), all_of_it(2*layers), x(2*layers)
-    real(sp) :: single(2*layers)
-    integer :: first, last, i
-
-    call own_layers(first, last)
-    mine = [(sqrt(real(i, wp)), i=1, 2*layers)]
-    call remove(path)
-    call meet()
-    call table%file%create(path, .true.)
-    call table%file%attribute('/', 'note', 'shared')
-    call table%file%store('/small', '1', [3, 4])
-    call table%file%new_blocks('/blocks', 'm', [2, layers])
-    call table%file%write_block('/blocks', [1, first], [2, last - first + 1], &
-      mine(2*first - 1:2*last))
-    do i = 0, 3
-      single = real(i*mine, sp)
-      call table%begin(merge(creating, appending, i == 0))
-      call table%column('/count', '1', real(i, wp))
-      call table%field('/field', 'm', [2, layers], [1, first], [2, last - first + 1], &
-        single(2*first - 1:2*last))
-      call table%file%attribute('/', 'steps', i)
-      call table%file%flush()
-    end do
-    call table%file%close()
-    call check_file('a shared file is written', table%file)
-
-    call table%file%open(path, .false., .false.)
-    all_of_it = 0.0_wp
-    call table%file%read_block('/blocks', [1, first], [2, last - first + 1], &
-      all_of_it(2*first - 1:2*last))
-    call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last))
-    call table%file%read('/blocks', all_of_it)
-    call check('blocks of all processes fit together', all_of_it, mine)
-    call table%file%read_block('/field', [1, 1, 3], [2, layers, 1], x)
-    call check('compressed blocks fit together', x, real(real(3*mine, sp), wp))
-    call table%file%read('/count', x(:3))
-    call check('rows of the root process arrive', x(:3), [1.0_wp, 2.0_wp, 3.0_wp])
-    call table%file%close()
-    call check_file('no error with a shared file', table%file)
-    call meet()
-  end subroutine test_shared_blocks
 
   !> All processes together go on in a file that one process began.
   subroutine test_go_on_together()
