@@ -528,10 +528,13 @@ def test_blanks_at_the_end_of_a_name(tmp_path: Path) -> None:
 
 
 def test_run_shorter_than_a_step(tmp_path: Path) -> None:
+    """Of a case that is longer than the 64 kB of a plain attribute."""
     case = short_case(tmp_path / "case.nml", "t_end = 0.004")
+    case.write_text(case.read_text() + 9000 * "! a remark\n")
     assert run(tmp_path / "run", case=case) == (0, "")
     with opened(tmp_path / "run" / "run.h5") as h5:
         assert h5["series/time"][:].tolist() == [0.0, 0.004]
+        assert h5["provenance"].attrs["namelist"] == case.read_text()
 
 
 @pytest.mark.parametrize("interval", ["1e-20", "1e-13", "1e-11", "0.01"])

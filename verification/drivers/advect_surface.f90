@@ -59,8 +59,8 @@ contains
     allocate (start, source=flow%liquid)
     allocate (uf, source=flow%uf)
     call set_velocity(name, grid, uf)
-    period = period_of(name)
-    steps = ceiling(period*fastest(uf)*real(n, wp)/courant)
+    period = merge(8.0_wp, merge(3.0_wp, 1.0_wp, name == 'deformation'), name == 'vortex')
+    steps = ceiling(period*maxval(sum(abs(uf), 4))*real(n, wp)/courant)   ! sum over the directions
     dt = period/real(steps, wp)
     before = liquid_volume(grid, flow%liquid)
     past = 0.0_wp
@@ -80,23 +80,6 @@ contains
       liquid_volume(grid, flow%liquid)/before - 1.0_wp, past/grid%volume
     flush (output_unit)
   end subroutine turn
-
-  pure real(wp) function period_of(name)
-    character(*), intent(in) :: name
-
-    select case (name)
-    case ('vortex'); period_of = 8.0_wp
-    case ('deformation'); period_of = 3.0_wp
-    case default; period_of = 1.0_wp
-    end select
-  end function period_of
-
-  !> Largest sum of the speeds of a cell [m/s].
-  pure real(wp) function fastest(uf)
-    real(wp), intent(in) :: uf(:, :, :, :)
-
-    fastest = maxval(sum(abs(uf), 4))
-  end function fastest
 
   !> Is a point inside the liquid of the start?
   pure logical function inside(name, x)
@@ -119,29 +102,20 @@ contains
     character(*), intent(in) :: name
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(inout) :: flow
-    integer, parameter :: fine = 16
-    integer :: i, j, k, a, b, c, found, layers
+    integer :: fine(3), i, j, k, m, found
 
-    layers = merge(1, fine, grid%n(2) == 1)
-    do k = 1, grid%n(3)
-      do j = 1, grid%n(2)
-        do i = 1, grid%n(1)
-          found = 0
-          do c = 1, fine
-            do b = 1, layers
-              do a = 1, fine
-                if (inside(name, grid%face([i, j, k], [1, 2, 3]) + grid%h*([a, b, c] - 0.5_wp) &
-                           /real([fine, layers, fine], wp))) found = found + 1
-              end do
-            end do
-          end do
-          flow%fluid_volume(i, j, k) = grid%volume
-          flow%liquid(i, j, k) = grid%volume*real(found, wp)/real(fine*fine*layers, wp)
-        end do
+    fine = 16
+    if (grid%n(2) == 1) fine(2) = 1
+    do concurrent (k=1:grid%n(3), j=1:grid%n(2), i=1:grid%n(1))
+      found = 0
+      do m = 0, product(fine) - 1
+        if (inside(name, grid%face([i, j, k], [1, 2, 3]) + grid%h*(modulo(m/[1, fine(1), &
+          fine(1)*fine(2)], fine) + 0.5_wp)/fine)) found = found + 1
       end do
+      flow%liquid(i, j, k) = grid%volume*real(found, wp)/product(fine)
     end do
+    flow%fluid_volume = grid%volume
     call fill_scalar_halo(grid, flow%liquid)
-    call fill_scalar_halo(grid, flow%fluid_volume)
   end subroutine fill
 
   !> Velocity of the lower faces at its largest.
@@ -154,22 +128,17 @@ contains
 
     uf = 0.0_wp
     h = grid%h
-    do k = 1, grid%n(3) + 1
-      do j = 1, grid%n(2) + 1
-        do i = 1, grid%n(1) + 1
-          x = grid%face(i, 1)
-          y = grid%face(j, 2)
-          z = grid%face(k, 3)
-          if (name == 'deformation') then
-            uf(i, j, k, 1) = 2.0_wp*sin(pi*x)**2*mean(y, h(2))*mean(z, h(3))
-            uf(i, j, k, 2) = -mean(x, h(1))*sin(pi*y)**2*mean(z, h(3))
-            uf(i, j, k, 3) = -mean(x, h(1))*mean(y, h(2))*sin(pi*z)**2
-          else
-            uf(i, j, k, 1) = (stream(name, x, z + h(3)) - stream(name, x, z))/h(3)
-            uf(i, j, k, 3) = -(stream(name, x + h(1), z) - stream(name, x, z))/h(1)
-          end if
-        end do
-      end do
+    do concurrent (k=1:grid%n(3) + 1, j=1:grid%n(2) + 1, i=1:grid%n(1) + 1)
+      x = grid%face(i, 1)
+      y = grid%face(j, 2)
+      z = grid%face(k, 3)
+      if (name == 'deformation') then
+        uf(i, j, k, :) = [2.0_wp*sin(pi*x)**2*mean(y, h(2))*mean(z, h(3)), &
+          -mean(x, h(1))*sin(pi*y)**2*mean(z, h(3)), -mean(x, h(1))*mean(y, h(2))*sin(pi*z)**2]
+      else
+        uf(i, j, k, 1) = (stream(name, x, z + h(3)) - stream(name, x, z))/h(3)
+        uf(i, j, k, 3) = -(stream(name, x + h(1), z) - stream(name, x, z))/h(1)
+      end if
     end do
   end subroutine set_velocity
 

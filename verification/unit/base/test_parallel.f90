@@ -1,4 +1,5 @@
-!> The parallel layer: halos, gathering, reductions and order-free sums on any number of processes.
+!> The parallel layer: halos and order-free sums on any number of processes. Whole runs on them:
+!! `verification/test_bits.py`.
 ! ranks: 2 4
 module test_parallel_m
   use check_m, only: check, wp, sp, i8
@@ -7,7 +8,7 @@ module test_parallel_m
     no_terms, accumulator_size
   use random_counter_m, only: uniform
   use parallel_m, only: decompose, halo_exchange, gather_all, &
-    global_max, global_sum, broadcast, nproc, my_rank, is_root, set_threads, get_threads
+    global_max, global_sum, nproc, my_rank, is_root, set_threads, get_threads
   implicit none
   private
   public :: test_parallel
@@ -26,10 +27,7 @@ contains
     call test_halos([16, 8, 24], all_open)
     call test_halos([30, 18, 9], [.true., .false., .true.])
     call test_other_kinds([16, 8, 24])
-    call test_gather([20, 12, 21])
-    call test_reductions()
     call test_sums([20, 12, 21])
-    call test_broadcast()
     call set_threads(2)
     call check('threads', get_threads(), 2)
   end subroutine test_parallel
@@ -127,39 +125,6 @@ contains
     call check('single precision like integers', all(nint(s) == m))
   end subroutine test_other_kinds
 
-  subroutine test_gather(n)
-    integer, intent(in) :: n(3)
-    integer :: lo(3), hi(3), i, j, k
-    logical :: at_side(2, 3)
-    real(wp), allocatable :: whole(:, :, :), wanted(:, :, :)
-    real(sp), allocatable :: single(:, :, :)
-
-    call decompose(n, all_open, lo, hi, at_side)
-    allocate (wanted(n(1), n(2), n(3)), whole(n(1), n(2), n(3)), single(n(1), n(2), n(3)))
-    do concurrent (k=1:n(3), j=1:n(2), i=1:n(1))
-      wanted(i, j, k) = label([i, j, k], n, all_open)
-    end do
-    whole = 0.0_wp
-    call gather_all(wanted(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3)), lo, hi, whole)
-    call check('gathered field', all(abs(whole - wanted) <= 0))
-    single = 0.0_sp
-    call gather_all(real(wanted(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3)), sp), lo, hi, single)
-    call check('gathered field, single precision', all(abs(single - real(wanted, sp)) <= 0))
-  end subroutine test_gather
-
-  subroutine test_reductions()
-    real(wp) :: x(2)
-    integer(i8) :: m(2)
-
-    x = [real(my_rank(), wp), 7.0_wp]
-    m = [my_rank() + 1_i8, 1_i8]
-    call global_max(x)
-    call global_sum(m)
-    call check('largest', x, [nproc() - 1.0_wp, 7.0_wp])
-    call check('sum of counts', int(m(1)), nproc()*(nproc() + 1)/2)
-    call check('number of processes', int(m(2)), nproc())
-  end subroutine test_reductions
-
   !> Sums over blocks equal the sum of one process over everything, bit for bit.
   subroutine test_sums(n)
     integer, intent(in) :: n(3)
@@ -198,25 +163,5 @@ contains
     call exact_add(x, accumulator)
     s = accumulator_value(accumulator)
   end function whole_sum
-
-  subroutine test_broadcast()
-    character(:), allocatable :: text
-    integer :: i
-    logical :: yes
-
-    allocate (text, source='nothing')
-    i = 0
-    yes = .false.
-    if (is_root()) then
-      text = '&run t_end = 1 /'//new_line('a')//'two lines'
-      i = 5
-      yes = .true.
-    end if
-    call broadcast(text)
-    call broadcast(i)
-    call broadcast(yes)
-    call check('text', text == '&run t_end = 1 /'//new_line('a')//'two lines' .and. len(text) == 26)
-    call check('integer and logical', i == 5 .and. yes)
-  end subroutine test_broadcast
 
 end module test_parallel_m

@@ -51,11 +51,9 @@ contains
     print '(5a)', 'model ', trim(models(model)), ', ', trim(solvers(model)), ':'
     call check_bouncing_ball()
     call check_fast_impact()
-    call check_colliding_balls()
     call check_landing_cube()
     call check_landing_slab()
     if (solvers(model) == 'springs') call check_swinging_ball()
-    call check_stack()
     call check_momentum()
     call check_energy()
     if (solvers(model) == 'springs') call check_constants()
@@ -146,27 +144,6 @@ contains
     call check('what the fluid took of the force', world%blocks%v(3, 1), -dt*g/1.25_wp, &
                1.0e-12_wp)
   end subroutine check_added_mass
-
-  !> Two balls, head on; and off centre, where only the normal velocity is reversed.
-  subroutine check_colliding_balls()
-    real(wp), parameter :: e(3) = [0.1_wp, 0.5_wp, 0.9_wp]
-    type(world_t) :: world
-    real(wp) :: n(3), before, after
-    integer :: m
-
-    do m = 1, size(e)
-      n = [0.6_wp, 0.0_wp, 0.8_wp]
-      call start(smooth//to_text(e(m)), space//ball//body('ball', middle, &
-        [0.0_wp, 0.1_wp, 0.9_wp])//body('ball', middle + 1.001_wp*d*n, -0.3_wp*up), world)
-      before = dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n)
-      call move(world, 1, dt)
-      if (solvers(model) == 'springs') n = world%blocks%x(:, 2) - world%blocks%x(:, 1)
-        ! has hardly turned; impulses are those of where they stood
-      call move(world, 3, dt)
-      after = dot_product(world%blocks%v(:, 2) - world%blocks%v(:, 1), n/norm2(n))
-      call check('restitution of two balls', -after/before, e(m), 0.02_wp)
-    end do
-  end subroutine check_colliding_balls
 
   !> Many contact points at once damp like one: a cube on its face, edge and corner.
   subroutine check_landing_cube()
@@ -267,32 +244,6 @@ contains
       - 0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, &
       0.01_wp*energy)
   end subroutine check_swinging_ball
-
-  !> Two cubes set one on the other come to rest; counterparts are counted; forces balance the
-  !! weight.
-  subroutine check_stack()
-    type(world_t) :: world
-    real(wp) :: change(3, 2), weight, v(3, 2)
-
-    call start('friction=.6', tank//cube//body('cube', middle)//body('cube', middle), world)
-    world%blocks%x(3, :) = [1, 3]*lowest(world%shapes(1), upright)
-    call move(world, 10, dt)
-    v = world%blocks%v
-    call move(world, 1, dt)
-    weight = g*world%blocks%mass(1)
-    change = world%blocks%mass(1)*(world%blocks%v - v)/dt
-    change(3, :) = change(3, :) + weight
-    call check('M dU/dt = contact + M g', change - world%blocks%contact_force, 0.0_wp, 1.0e-12_wp)
-    call move(world, 500, dt)
-    call check('at rest', &
-      world%blocks%v, 0.0_wp, merge(1.0e-9_wp, 1.0e-8_wp, solvers(model) == 'springs'))
-    call check('on the floor', all(world%blocks%on_floor == [1, 0]))
-    call check('counterparts', all(world%blocks%contacts == [2, 1]))
-    call check('weight on each', world%blocks%contact_force(3, :) - weight, 0.0_wp, 1.0e-8_wp)
-    call check('no torque', world%blocks%contact_torque, 0.0_wp, 1.0e-10_wp)
-    if (solvers(model) == 'springs') call check('energy', world%contact%energy > 0.0_wp)
-    call check('upright', abs(world%blocks%q(1, 2)), 1.0_wp, 1.0e-6_wp)
-  end subroutine check_stack
 
   !> Momentum and angular momentum of colliding bodies, with friction and damping, no walls near.
   subroutine check_momentum()

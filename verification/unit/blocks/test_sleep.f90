@@ -198,6 +198,7 @@ contains
       more='release_time=1'), one, two)
     call run(1.0_wp, one, two)
     call check('sleeps', one%blocks%asleep(1))
+    call check('on the floor alone', all([one%blocks%contacts(1), one%blocks%on_floor(1)] == 1))
     call release_body(1.0_wp, 3, one%blocks)
     call release_body(1.0_wp, 3, two%blocks)
     call check('energy of the rest', kinetic_energy(one%blocks), one%blocks%mass(3)/8, 1.0e-15_wp)

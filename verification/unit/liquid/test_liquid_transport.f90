@@ -38,8 +38,6 @@ contains
     call column_in_rotation()
     call box_under_water(1)
     call box_under_water(3)
-    call box_through_the_surface()
-    call box_leaves_through_the_top()
     call hexapod_through_the_surface()
     call no_way_out()
     call two_basins()
@@ -231,41 +229,14 @@ contains
          0.09_wp + 0.03_wp*sin(angle)]
   end function place
 
-  !> A box dips into the water and comes out again.
-  subroutine box_through_the_surface()
-    real(wp) :: clamped, angle
-    integer :: step
-
-    call start_box([0.0771_wp, 0.0613_wp, 0.15_wp], 0.1013_wp)
-    clamped = 0.0_wp
-    do step = 1, 80
-      angle = 2.0_wp*pi*real(step, wp)/80.0_wp
-      call carry_box(step, [0.0771_wp + 0.01_wp*sin(2.0_wp*angle), 0.0613_wp, &
-                            0.15_wp - 0.05_wp*sin(angle)])
-      clamped = max(clamped, transport%sweeps%clamped)
-    end do
-    call check_books('box through the surface')
-    call check('box through the surface: slabs need no clipping', clamped, 0.0_wp, 1.0e-13_wp)
-  end subroutine box_through_the_surface
-
-  !> A box moves out through the open top: what it leaves behind comes in as gas.
-  subroutine box_leaves_through_the_top()
-    integer :: step
-
-    call start_box([0.0771_wp, 0.0613_wp, 0.15_wp], 0.0613_wp)
-    do step = 1, 30
-      call carry_box(step, [0.0771_wp, 0.0613_wp, 0.15_wp + 0.0031_wp*real(step, wp)])
-    end do
-    call check_books('box leaves')
-    call check('box leaves: no liquid through the top', flow%liquid_inflow, 0.0_wp)
-  end subroutine box_leaves_through_the_top
-
   !> A turning hexapod dips into the water and comes out again, fluid moved by the correction alone.
   subroutine hexapod_through_the_surface()
     type(one_body_t) :: block
     type(solid_geometry_t) :: before
+    real(wp) :: clamped
     integer :: step
 
+    clamped = 0.0_wp
     call start(tank_cells, tank, walls, nothing, nothing, 0.1013_wp, [water_t ::])
     call place_body('&grid cells=16,12,20 length=.16,.12,.2/ &shape name="h" kind="hexapod" ' &
       //'size=.03 refinement=1/ &body shape="h" position=.0771,.0611,.14/', block)
@@ -277,7 +248,9 @@ contains
       block%blocks%q(:, 1) = quaternion_from_axis([1.0_wp, -0.4_wp, 0.3_wp], 0.08_wp*real(step, wp))
       call update_solid(block%fraction, grid, block%blocks, block%solid)
       call carry(step, 0.01_wp, before, block%solid)
+      clamped = max(clamped, transport%sweeps%clamped)
     end do
+    call check('hexapod: slabs need no clipping', clamped, 0.0_wp, 1.0e-13_wp)
     call check_books('hexapod')
     call check('hexapod: C^ within 0 and 1', all(flow%c >= 0.0_wp .and. flow%c <= 1.0_wp))
   end subroutine hexapod_through_the_surface

@@ -16,8 +16,6 @@ module test_hdf5_file_m
 contains
 
   subroutine test_hdf5_file()
-    call test_attributes()
-    call test_datasets()
     call test_columns()
     call test_go_on_together()
     call test_room()
@@ -58,62 +56,6 @@ contains
     here = 0.0_wp
     call global_max(here)
   end subroutine meet
-
-  subroutine test_attributes()
-    type(h5_file_t) :: file
-    character(:), allocatable :: long, text
-    integer :: n
-
-    if (.not. is_root()) return
-    long = repeat('&body position = 0.1, 0.2, 0.3 /'//new_line('a'), 5000)   ! more than 64 kB
-    call fresh(file)
-    call file%group('/provenance')
-    call file%attribute('/provenance', 'namelist', long)
-    call file%attribute('/provenance', 'empty', '')
-    call file%attribute('/provenance', 'finished', '')
-    call file%attribute('/provenance', 'exit_status', -1)
-    call file%attribute('/provenance', 'exit_status', 3)
-    call file%attribute('/provenance', 'finished', 'now')
-    call file%close()
-    call check_file('attributes are written', file)
-    call file%open(path, .false., .false.)
-    call file%read_attribute('/provenance', 'namelist', text)
-    call check('a text longer than 64 kB comes back', text == long .and. len(text) == len(long))
-    call file%read_attribute('/provenance', 'empty', text)
-    call check('an empty text comes back', len(text), 0)
-    call file%read_attribute('/provenance', 'finished', text)
-    call check('a text can be replaced by a longer one', text == 'now')
-    call file%read_attribute('/provenance', 'exit_status', n)
-    call check('a number can be replaced', n, 3)
-    call file%close()
-  end subroutine test_attributes
-
-  subroutine test_datasets()
-    type(h5_file_t) :: file
-    real(wp) :: a(2, 3), b(6)
-    integer :: i, n(4)
-
-    if (.not. is_root()) return
-    a = reshape([(1.0_wp/i, i=1, 6)], [2, 3])
-    call fresh(file)
-    call file%store('/a', 'm', [a], shape(a))
-    call file%store('/n', '1', [5, 6, 7, 8])
-    call file%store('/nothing', 'm', [real(wp) ::])
-    call file%store('/name', '1', ['hexapod', 'box    '])
-    call file%store('/a', 'm', [(2.0_wp/i, i=1, 6)], [2, 3])
-    call file%close()
-    call check_file('datasets are written', file)
-    call file%open(path, .false., .false.)
-    call file%read('/a', b)
-    call check('reals come back bit by bit', b, [(2.0_wp/i, i=1, 6)])
-    call file%read('/n', n)
-    call check('integers come back', all(n == [5, 6, 7, 8]))
-    call file%read('/nothing', b(:0))
-    call check_file('an empty dataset comes back', file)
-    call file%read('/n', n(:3))
-    call check('another size is noticed', file%info /= 0)
-    call file%close()
-  end subroutine test_datasets
 
   !> The columns of a table that has all kinds of them.
   subroutine list_columns(step, mode, table)
