@@ -90,6 +90,12 @@ def test_rows_of_several_steps_do_not_tell_the_energy_of_contact(make_run) -> No
     assert check.good is None and check.found.startswith("not known: needs a row every step")
 
 
+def test_what_older_programs_do_not_tell(make_run) -> None:
+    found = checks_of(changed(make_run(APART), volume_excess_max=np.nan, energy_excess=np.nan))
+    assert not any("excess of fluid" in name for name in found)
+    assert any("not known" in c.found for name, c in found.items() if "put in" in name)
+
+
 def test_what_makes_blocks_stiffer_depends_on_the_contact(make_run) -> None:
     run = make_run(replace(APART, more="&contact model = 'spheres' /\n"))
     assert "model = 'surface'" in health._stiffer(run)

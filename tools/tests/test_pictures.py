@@ -225,19 +225,6 @@ def test_check_pile_prints_the_findings(loose_pile: Run) -> None:
     assert "pattern A" in shown.stdout
 
 
-def test_the_table_holds_every_row(loose_pile: Run, tmp_path: Path) -> None:
-    b = loose_pile.bodies
-    with exports.to_csv(loose_pile, 0, tmp_path).open() as file:
-        table = list(csv.DictReader(file))
-    assert len(table) == len(b.time) * b.n
-    line = table[150 * b.n + 4]
-    assert (line["block"], line["shape"], line["released"]) == ("5", "hexapod", "1")
-    assert [float(line[name]) for name in ("time", "x", "qz", "vz")] == [
-        b.time[150], b.position[150, 4, 0], b.quaternion[150, 4, 3], b.velocity[150, 4, 2]
-    ]  # fmt: skip
-    assert table[9 * 10 + 8]["released"] == "0"
-
-
 def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
     run = make_run(Motion(t_end=2.0, field_step=2.0))  # too late for the third and later ones
     b = run.bodies

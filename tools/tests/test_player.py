@@ -344,6 +344,8 @@ def test_it_fits_a_phone(browser: Browser, page: Path, name: str, dark: bool) ->
     browser.open(page, 360, 740, dark)
     view(browser, name)
     assert browser.run("document.documentElement.scrollWidth") <= 360
+    light = browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert light is not dark
     assert browser.run("runPlayer.stage.overlay.canvas.width") == browser.run(
         "runPlayer.stage.canvas.width"
     )

@@ -380,30 +380,27 @@ def test_figures_have_three_digits(value: float, words: str) -> None:
     assert units.figure(value) == words
 
 
-class Plain:
-    """Units with their texts in plain blanks."""
-
-    def __init__(self, of: units.Units) -> None:
-        self.of = of
-
-    def __getattr__(self, kind: str) -> Any:
-        unit = self.of.of_kind(kind)
-        text = lambda value: unit.text(value).replace("\u00a0", " ")  # noqa: E731
-        return SimpleNamespace(text=text, plain=unit.plain)
-
-
-def test_units_grow_with_the_blocks() -> None:
-    laboratory, site = units.of_size(0.06), units.of_size(2.0)
-    assert laboratory.length.text(0.0679) == "67.9\u00a0mm"
-    laboratory, site = Plain(laboratory), Plain(site)
-    assert laboratory.length.text(0.0679) == "67.9 mm" and site.length.text(6.79) == "6.79 m"
-    assert laboratory.area.text(0.0123) == "123 cm²" and site.area.text(61.2) == "61.2 m²"
-    assert laboratory.volume.text(56e-6) == "56 cm³" and site.volume.text(2.24) == "2.24 m³"
-    assert laboratory.mass.text(0.129) == "0.129 kg" and site.mass.text(5376.0) == "5.38 t"
-    assert laboratory.force.text(1.264) == "1.26 N" and site.force.text(1.01e6) == "1010 kN"
-    assert laboratory.energy.text(0.0757) == "75.7 mJ" and site.energy.text(6790.0) == "6.79 kJ"
-    assert laboratory.speed.text(0.512) == site.speed.text(0.512) == "0.512 m/s"
-    assert site.area.plain(61.2) == "61.2 m2" and site.area.plain(float("nan")) == "-"
+@pytest.mark.parametrize(
+    ("kind", "small", "words", "large", "others"),
+    [
+        ("length", 0.0679, "67.9 mm", 6.79, "6.79 m"),
+        ("area", 0.0123, "123 cm²", 61.2, "61.2 m²"),
+        ("volume", 56e-6, "56 cm³", 2.24, "2.24 m³"),
+        ("mass", 0.129, "0.129 kg", 5376.0, "5.38 t"),
+        ("force", 1.264, "1.26 N", 1.01e6, "1010 kN"),
+        ("energy", 0.0757, "75.7 mJ", 6790.0, "6.79 kJ"),
+        ("speed", 0.512, "0.512 m/s", 0.512, "0.512 m/s"),
+    ],
+)
+def test_units_grow_with_the_blocks(
+    kind: str, small: float, words: str, large: float, others: str
+) -> None:
+    """With a blank that does not break; in plain letters for a terminal."""
+    for size, value, told in ((0.06, small, words), (2.0, large, others)):
+        unit = units.of_size(size).of_kind(kind)
+        assert unit.text(value) == told.replace(" ", "\u00a0")
+        assert unit.plain(value) == told.replace("²", "2").replace("³", "3")
+    assert units.of_size(2.0).area.plain(float("nan")) == "-"
 
 
 def test_arrays_and_several_figures() -> None:
