@@ -261,8 +261,7 @@ contains
       '  --quiet         no progress table', &
       '  --version       version and revision of the source', &
       '  --help [GROUP]  this text, or every variable of a group of the case', &
-      '  --help=markdown --help=json', &
-      '                  all groups as the page docs/reference.md, or as a JSON schema', &
+      '  --help=json     all groups as a JSON schema', &
       '', &
       'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
       '            128 + N ended by signal N, 143 also by a file named stop in the', &

@@ -1,23 +1,28 @@
-!> The reference of the case file: each variable of each group by the reading procedures.
+!> What the program says of its case files: the variables of a group for people, all groups as a
+!! JSON schema for programs. Both come from the procedures that read a case.
+!!
+!! In the schema a case is an object of groups, a group an object of variables; several groups of
+!! one name are an array of objects, a list of values is an array. Reports take the defaults from it,
+!! and `tools/write_reference.py` makes the page docs/reference.md of both.
 module reference_m
+  use kinds_m, only: name_length
   use allowed_values_m, only: entry_t, choices, words_of
   use group_visitor_m, only: group_visitor_t
   use string_builder_m, only: string_builder_t
   use case_input_m, only: group_names, is_repeated, list_entries
   use errors_m, only: problems_t, to_text
-  use schema_m, only: schema_text
   use value_text_m, only: lower_case, nearest_name, printable
   implicit none
   private
   public :: reference_text
 
   integer, parameter :: width = 96    !! columns of the help
+  character(*), parameter :: line_end = new_line('a')
 
 contains
 
-  !> The help on a topic: all groups in a line each (''), the variables of one group (its name),
-  !! the page of docs/reference.md ('markdown') or the schema for editors ('json'). Another topic
-  !! is a problem, reported with the nearest group.
+  !> The help on a topic: all groups in a line each (''), the variables of one group (its name), or
+  !! the schema ('json'). Another topic is a problem, reported with the nearest group.
   function reference_text(topic, problems) result(text)
     character(*), intent(in) :: topic
     type(problems_t), intent(inout) :: problems   !! gets an unknown topic
@@ -29,14 +34,13 @@ contains
     text = ''
     select case (topic)
     case ('')
-      text = 'Groups of a case (* any number); --help GROUP lists the variables:'//new_line('a')
+      text = 'Groups of a case (* any number); --help GROUP lists the variables:'//line_end
       do g = 1, size(group_names)
         call list_entries(group_names(g), v)
         name = group_names(g)(:12)
         if (is_repeated(g)) name = trim(name)//' *'
-        text = text//'  '//name//v%meaning//new_line('a')
+        text = text//'  '//name//v%meaning//line_end
       end do
-    case ('markdown'); text = page_text()
     case ('json'); text = schema_text()
     case default
       do g = 1, size(group_names)
@@ -54,6 +58,7 @@ contains
     character(:), allocatable :: text
     type(string_builder_t) :: lines
     type(group_visitor_t) :: v
+    character(:), allocatable :: default
     integer :: i, indent
 
     call list_entries(group_names(g), v)
@@ -62,9 +67,12 @@ contains
     indent = maxval(len_trim(v%entry(:v%n)%name)) + 4
     do i = 1, v%n
       associate (entry => v%entry(i))
+        default = 'default '//entry%value()
+        if (len(entry%value()) == 0) default = 'no default'
+        if (entry%required) default = 'required'
         call lines%add_line('')
         call lines%add_line('  '//entry%name(:indent - 2) &
-          //wrapped(values(entry, with_unit=.true.)//'; '//default_words(entry), indent))
+          //wrapped(values(entry)//'; '//default, indent))
         call lines%add_line(repeat(' ', indent)//wrapped(entry%meaning, indent))
         call lines%add_line(repeat(' ', indent)//'example: '//entry%example)
       end associate
@@ -84,79 +92,15 @@ contains
     do while (len(text) - first >= width - indent)
       last = first - 1 + index(text(first:first + width - indent), ' ', back=.true.)
       if (last < first) exit
-      lines = lines//text(first:last - 1)//new_line('a')//repeat(' ', indent)
+      lines = lines//text(first:last - 1)//line_end//repeat(' ', indent)
       first = last + 1
     end do
     lines = lines//text(first:)
   end function wrapped
 
-  !> The page with a table for each group.
-  function page_text() result(text)
-    character(:), allocatable :: text
-    type(string_builder_t) :: lines
-    type(group_visitor_t) :: v
-    character(:), allocatable :: default
-    integer :: g, i
-    character(*), parameter :: head(*) = [character(98) :: &
-      '# The case file: every group and variable', &
-      '', &
-      'Written by `make reference` from the lines of `src/case` that read and check a case; do ' &
-      //'not edit.', &
-      '`./mics --help GROUP` prints the same. `docs/mics-case.schema.json` holds it as a JSON ' &
-      //'schema: the', &
-      'page of `mics-tools report` takes the defaults from it, and Python checks a case by it ' &
-      //'with the', &
-      'packages f90nml and jsonschema:', &
-      '', &
-      '```python', &
-      'import json, f90nml, jsonschema', &
-      'case = f90nml.read(''input/blocks.nml'')', &
-      'case = {k: [dict(g) for g in v] if isinstance(v, list) else dict(v)', &
-      '        for k, v in case.items()}', &
-      'jsonschema.validate(case, json.load(open(''docs/mics-case.schema.json'')))', &
-      '```', &
-      '', &
-      'SI units; angles in degrees where a name ends in `_deg`.']
-
-    do i = 1, size(head)
-      call lines%add_line(trim(head(i)))
-    end do
-    do g = 1, size(group_names)
-      call list_entries(group_names(g), v)
-      call lines%add_line(new_line('a')//'## &'//v%group%name//new_line('a'))
-      text = v%meaning
-      if (text(1:1) >= 'a') text(1:1) = achar(iachar(text(1:1)) - 32)
-      if (is_repeated(g)) text = text//'; a case may hold any number of these groups'
-      call lines%add_line(text//'.'//new_line('a'))
-      call lines%add_line('| variable | values | default | unit | meaning | example |')
-      call lines%add_line('|---|---|---|---|---|---|')
-      do i = 1, v%n
-        associate (entry => v%entry(i))
-          default = default_words(entry)
-          if (index(default, 'default ') == 1) default = '`'//entry%value()//'`'
-          call lines%add_line('| `'//trim(entry%name)//'` | '//values(entry, with_unit=.false.) &
-            //' | '//default//' | '//trim(entry%allowed%unit)//' | '//entry%meaning//' | `' &
-            //entry%example//'` |')
-        end associate
-      end do
-    end do
-    text = lines%text()
-  end function page_text
-
-  !> The default, or why there is none.
-  pure function default_words(entry) result(words)
-    type(entry_t), intent(in) :: entry
-    character(:), allocatable :: words
-
-    words = 'default '//entry%value()
-    if (len(entry%value()) == 0) words = 'no default'
-    if (entry%required) words = 'required'
-  end function default_words
-
   !> What a variable may be.
-  pure function values(entry, with_unit) result(words)
+  pure function values(entry) result(words)
     type(entry_t), intent(in) :: entry
-    logical, intent(in) :: with_unit
     character(:), allocatable :: words
 
     select case (entry%kind)
@@ -168,7 +112,7 @@ contains
         if (allowed%whole) words = 'whole number'
         if (entry%most > 1) words = to_text(entry%most)//' '//words//'s'
         if (allowed%fewest > 0) words = to_text(allowed%fewest)//' to '//words
-        if (with_unit .and. allowed%unit /= '') words = words//' ['//trim(allowed%unit)//']'
+        if (allowed%unit /= '') words = words//' ['//trim(allowed%unit)//']'
         if (allowed%bounded_below()) words = words//', '//allowed%words()
       end associate
     case default
@@ -176,5 +120,153 @@ contains
       if (entry%most > 1) words = '1 to '//to_text(entry%most)//' '//words//'s'
     end select
   end function values
+
+  !> The schema of all groups.
+  function schema_text() result(text)
+    character(:), allocatable :: text
+    type(group_visitor_t) :: v
+    character(:), allocatable :: name, place, places, groups, needed
+    integer :: g
+
+    places = ''
+    groups = ''
+    needed = ''
+    do g = 1, size(group_names)
+      name = trim(group_names(g))
+      call list_entries(name, v)
+      groups = groups//','//line_end//'  "'//name//'": '//group_schema(v)
+      place = '{"$ref": "#/$defs/'//name//'"}'
+      if (is_repeated(g)) then
+        place = '{"anyOf": ['//place//', {"type": "array", "items": '//place//'}]}'
+      else if (any(v%entry(:v%n)%required)) then
+        needed = needed//' '//name
+      end if
+      places = places//','//line_end//'  "'//name//'": '//place
+    end do
+    text = '{"$schema": "https://json-schema.org/draft/2020-12/schema",'//line_end &
+      //'"title": "Case file of mics",'//line_end &
+      //'"description": "Written by make reference; do not edit.",'//line_end &
+      //'"type": "object", "additionalProperties": false, "required": ' &
+      //strings(needed(2:), ' ')//','//line_end//'"properties": {'//places(2:)//'},'//line_end &
+      //'"$defs": {'//groups(2:)//'}}'//line_end
+  end function schema_text
+
+  !> The schema of a group, a variable in each line.
+  function group_schema(v) result(text)
+    type(group_visitor_t), intent(in) :: v
+    character(:), allocatable :: text
+    character(:), allocatable :: needed, rest, rules
+    integer :: i, bar
+
+    needed = ''
+    rules = ''
+    do i = 1, v%n
+      associate (entry => v%entry(i))
+        rules = rules//','//line_end//'    "'//trim(entry%name)//'": {"description": ' &
+          //quoted(entry%with_unit())//', '//value_schema(entry)
+        if (entry%allowed%unit /= '') rules = rules//', "unit": "'//trim(entry%allowed%unit)//'"'
+        if (entry%required) then
+          needed = needed//' '//trim(entry%name)
+        else if (len(entry%value()) > 0) then
+          rules = rules//', "default": '//json(entry%value(), entry%most > 1)
+        end if
+        rules = rules//', "examples": ['//json(entry%example(index(entry%example, ' = ', &
+          back=.true.) + 3:), entry%most > 1)//']}'
+      end associate
+    end do
+    text = '{"type": "object", "description": '//quoted(v%meaning)//', "additionalProperties": false'
+    if (v%ways /= '') then
+      rest = v%ways//'|'
+      needed = ''
+      do while (rest /= '')
+        bar = index(rest, '|')
+        needed = needed//', {"required": '//strings(rest(:bar - 1), ' ')//'}'
+        rest = rest(bar + 1:)
+      end do
+      text = text//', "anyOf": ['//needed(3:)//']'
+    else if (needed /= '') then
+      text = text//', "required": '//strings(needed(2:), ' ')
+    end if
+    text = text//', "properties": {'//rules(2:)//'}}'
+  end function group_schema
+
+  !> What the values of a variable may be.
+  pure function value_schema(entry) result(text)
+    type(entry_t), intent(in) :: entry
+    character(:), allocatable :: text
+    character(:), allocatable :: one, fewest
+
+    select case (entry%kind)
+    case ('logical'); text = '"type": "boolean"'
+    case ('name'); text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
+    case ('choice'); text = '"enum": '//strings(entry%choices, ' ')
+    case ('number')
+      associate (allowed => entry%allowed)
+        text = '"type": "number"'
+        if (allowed%whole) text = '"type": "integer"'
+        one = ', "exclusiveMinimum": '
+        if (allowed%with_low) one = ', "minimum": '
+        if (allowed%bounded_below()) text = text//one//to_text(allowed%low)
+        if (allowed%bounded_above()) text = text//', "maximum": '//to_text(allowed%high)
+      end associate
+    case default; text = '"type": "string"'
+    end select
+    if (entry%most == 1) return
+    one = text
+    fewest = to_text(merge(entry%allowed%fewest, entry%most, entry%allowed%fewest > 0))
+    text = '"type": "array", "items": {'//one//'}, "minItems": '//fewest//', "maxItems": ' &
+      //to_text(entry%most)
+    if (entry%allowed%fewest == 1) text = '"anyOf": [{'//one//'}, {'//text//'}]'
+  end function value_schema
+
+  !> A value of a case file in JSON: text, a logical, a number or a list of numbers or names.
+  pure function json(value, list) result(text)
+    character(*), intent(in) :: value
+    logical, intent(in) :: list
+    character(:), allocatable :: text
+
+    select case (value(1:1))
+    case ('''')
+      text = quoted(value(2:len(value) - 1))
+      if (list .and. index(value, ''', ''') > 0) text = strings(value(2:len(value) - 1), ''', ''')
+    case ('.')
+      text = value(2:len(value) - 1)
+    case default
+      text = value
+      if (list .and. index(value, ',') > 0) text = '['//value//']'
+    end select
+  end function json
+
+  !> A list of words in JSON.
+  pure function strings(words, separator) result(text)
+    character(*), intent(in) :: words, separator
+    character(:), allocatable :: text
+    integer :: first, length
+
+    text = '['
+    first = 1
+    do
+      length = index(words(first:), separator) - 1
+      if (length < 0) exit
+      text = text//'"'//words(first:first + length - 1)//'", '
+      first = first + length + len(separator)
+    end do
+    text = text//'"'//words(first:)//'"]'
+  end function strings
+
+  !> A string between double quotes. The texts of the groups hold nothing that must be escaped
+  !! but double quotes and backslashes.
+  pure function quoted(raw) result(text)
+    character(*), intent(in) :: raw
+    character(:), allocatable :: text
+    integer :: i
+
+    text = '"'
+    do i = 1, len(raw)
+      if (scan(raw(i:i), '"\') == 1) text = text//'\'
+      text = text//raw(i:i)
+    end do
+    text = text//'"'
+  end function quoted
 
 end module reference_m
