@@ -95,19 +95,19 @@ module parallel_m
     !! directions.
     module subroutine fill_wp(a, extent, width, layers, chosen)
       integer, intent(in) :: extent(4), width, layers
-      real(wp), intent(inout) :: a(extent(1), extent(2), extent(3), extent(4))
+      real(wp), intent(inout), asynchronous :: a(extent(1), extent(2), extent(3), extent(4))
       logical, intent(in) :: chosen(3)   !! directions to fill
     end subroutine fill_wp
 
     module subroutine fill_sp(a, extent, width, layers, chosen)
       integer, intent(in) :: extent(4), width, layers
-      real(sp), intent(inout) :: a(extent(1), extent(2), extent(3), extent(4))
+      real(sp), intent(inout), asynchronous :: a(extent(1), extent(2), extent(3), extent(4))
       logical, intent(in) :: chosen(3)
     end subroutine fill_sp
 
     module subroutine fill_integer(a, extent, width, layers, chosen)
       integer, intent(in) :: extent(4), width, layers
-      integer, intent(inout) :: a(extent(1), extent(2), extent(3), extent(4))
+      integer, intent(inout), asynchronous :: a(extent(1), extent(2), extent(3), extent(4))
       logical, intent(in) :: chosen(3)
     end subroutine fill_integer
 

@@ -1,16 +1,16 @@
 !> The parallel layer of a run on many processes, the only file that knows MPI.
 submodule (parallel_m) parallel_mpi_m
-  use, intrinsic :: iso_c_binding, only: c_int8_t, c_ptr, c_f_pointer, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_ptr, c_f_pointer, c_null_char
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_Init_thread, MPI_Finalize, MPI_Abort, MPI_Comm_size, MPI_Comm_rank
   use mpi_f08, only: MPI_Type_contiguous, MPI_Type_commit, MPI_Type_free, MPI_Op_create, MPI_Op_free
   use mpi_f08, only: MPI_Isend, MPI_Irecv, MPI_Waitall, MPI_Allreduce, MPI_Allgather
   use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
-  use mpi_f08, only: MPI_Alloc_mem, MPI_Free_mem, MPI_ADDRESS_KIND
+  use mpi_f08, only: MPI_Type_create_subarray, MPI_ORDER_FORTRAN
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
   use mpi_f08, only: MPI_INFO_NULL
-  use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_LOGICAL, MPI_MAX, MPI_SUM, MPI_THREAD_FUNNELED
+  use mpi_f08, only: MPI_CHARACTER, MPI_LOGICAL, MPI_MAX, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use c_library_m, only: c_setenv
   use decomposition_m, only: best_pieces, last_cell, min_cells
@@ -24,11 +24,13 @@ submodule (parallel_m) parallel_mpi_m
   type(MPI_Datatype) :: accumulator_type !! an accumulator of an order-free sum
   type(MPI_Op) :: accumulator_sum
 
-  !> Memory of the layers going out and coming in, lower and upper side. MPI hands it out, so every
-  !! kind of number may see it as its own and one set of messages serves them all; it only grows.
-  type(c_ptr) :: outgoing(2), incoming(2)
-  integer :: capacity = 0             !! of each [bytes]
-  type(MPI_Request) :: request(4) !! two to receive, two to send
+  !> Layers of arrays of one form that processes exchange.
+  type :: layers_t
+    integer :: key(8) = 0            !! all that they depend on
+    type(MPI_Datatype) :: part(2, 2)
+  end type layers_t
+  type(layers_t) :: known(256)
+  integer :: n_known = 0   !! so far, those that had to go included
 
 contains
 
@@ -48,7 +50,6 @@ contains
   end procedure parallel_init
 
   module procedure parallel_final
-    call free_buffers()
     call MPI_Op_free(accumulator_sum)
     call MPI_Type_free(accumulator_type)
     call MPI_Finalize()
@@ -118,166 +119,96 @@ contains
   end function rank_beside
 
   module procedure fill_wp
-    real(wp), pointer, contiguous :: box(:, :, :, :)
-    integer :: e, s, bytes, from(4), to(4)
+    type(MPI_Datatype) :: part(2, 2)
+    type(MPI_Request) :: request(4)
+    integer :: e, s
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
       if (wraps(e)) call wrap_wp(a, product(extent(:e - 1)), extent(e), &
-                                product(extent(e + 1:)), width)
+                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      call find_parts(extent, width, layers, e, MPI_DOUBLE_PRECISION, part)
       do s = 1, 2
-        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
-        bytes = product(to - from + 1)*storage_size(box)/8
-        if (s == 1) call expect_layers(e, bytes)
-        call c_f_pointer(outgoing(s), box, to - from + 1)
-        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
-        call send_layers(e, s, bytes)
+        call MPI_Irecv(a, 1, part(2, s), neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
+        call MPI_Isend(a, 1, part(1, s), neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
-      do s = 1, 2
-        if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
-        call c_f_pointer(incoming(s), box, to - from + 1)
-        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
-      end do
     end do
   end procedure fill_wp
 
   module procedure fill_sp
-    real(sp), pointer, contiguous :: box(:, :, :, :)
-    integer :: e, s, bytes, from(4), to(4)
+    type(MPI_Datatype) :: part(2, 2)
+    type(MPI_Request) :: request(4)
+    integer :: e, s
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
       if (wraps(e)) call wrap_sp(a, product(extent(:e - 1)), extent(e), &
-                                product(extent(e + 1:)), width)
+                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      call find_parts(extent, width, layers, e, MPI_REAL, part)
       do s = 1, 2
-        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
-        bytes = product(to - from + 1)*storage_size(box)/8
-        if (s == 1) call expect_layers(e, bytes)
-        call c_f_pointer(outgoing(s), box, to - from + 1)
-        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
-        call send_layers(e, s, bytes)
+        call MPI_Irecv(a, 1, part(2, s), neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
+        call MPI_Isend(a, 1, part(1, s), neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
-      do s = 1, 2
-        if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
-        call c_f_pointer(incoming(s), box, to - from + 1)
-        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
-      end do
     end do
   end procedure fill_sp
 
   module procedure fill_integer
-    integer, pointer, contiguous :: box(:, :, :, :)
-    integer :: e, s, bytes, from(4), to(4)
+    type(MPI_Datatype) :: part(2, 2)
+    type(MPI_Request) :: request(4)
+    integer :: e, s
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
       if (wraps(e)) call wrap_integer(a, product(extent(:e - 1)), extent(e), &
-                                product(extent(e + 1:)), width)
+                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      call find_parts(extent, width, layers, e, MPI_INTEGER, part)
       do s = 1, 2
-        call box_of_layers(extent, width, layers, e, inner(s, extent(e), width, layers), from, to)
-        bytes = product(to - from + 1)*storage_size(box)/8
-        if (s == 1) call expect_layers(e, bytes)
-        call c_f_pointer(outgoing(s), box, to - from + 1)
-        box = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
-        call send_layers(e, s, bytes)
+        call MPI_Irecv(a, 1, part(2, s), neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
+        call MPI_Isend(a, 1, part(1, s), neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
-      do s = 1, 2
-        if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call box_of_layers(extent, width, layers, e, outer(s, extent(e), width, layers), from, to)
-        call c_f_pointer(incoming(s), box, to - from + 1)
-        a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = box
-      end do
     end do
   end procedure fill_integer
 
-  !> Corners of the layers from `first` on that pass in direction e: all of the block in the other
-  !! directions, with as many layers of its halos.
-  pure subroutine box_of_layers(extent, width, layers, e, first, from, to)
-    integer, intent(in) :: extent(4), width, layers, e, first
-    integer, intent(out) :: from(4), to(4)
+  !> Layers that pass through the two sides of direction e: all of the block in the other directions,
+  !! with as many layers of its halos. Message s leaves through side s (1 lower, 2 upper) and comes
+  !! in through the other. MPI takes longer to describe layers than to send them, so they are kept.
+  subroutine find_parts(extent, width, layers, e, element, part)
+    integer, intent(in) :: extent(4), width, layers, e
+    type(MPI_Datatype), intent(in) :: element
+    type(MPI_Datatype), intent(out) :: part(2, 2)   !! sent, received; at the lower, upper side
+    integer :: key(8), box(4), first(4), start(2, 2), n, i, s
 
-    from = [width - layers + [1, 1, 1], 1]
-    to = [extent(:3) - width + layers, extent(4)]
-    from(e) = first
-    to(e) = first + layers - 1
-  end subroutine box_of_layers
-
-  !> Get ready for layers of so many bytes through the two sides of direction e.
-  !!
-  !! Message s leaves through side s (1 lower, 2 upper) and comes in through the other.
-  subroutine expect_layers(e, n)
-    integer, intent(in) :: e, n
-    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
-    integer :: s
-
-    call grow(n)
-    do s = 1, 2
-      call c_f_pointer(incoming(s), bytes, [n])
-      call MPI_Irecv(bytes, n, MPI_BYTE, neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
+    key = [extent, width, layers, e, element%MPI_VAL]
+    do n = 1, min(n_known, size(known))
+      if (any(known(n)%key /= key)) cycle
+      part = known(n)%part
+      return
     end do
-  end subroutine expect_layers
-
-  !> Send the n bytes in `outgoing(s)` through side s of direction e.
-  subroutine send_layers(e, s, n)
-    integer, intent(in) :: e, s, n
-    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
-
-    call c_f_pointer(outgoing(s), bytes, [n])
-    call MPI_Isend(bytes, n, MPI_BYTE, neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
-  end subroutine send_layers
-
-  !> Make room for n bytes in each buffer.
-  subroutine grow(n)
-    integer, intent(in) :: n
-    integer :: s
-
-    if (capacity >= n) return
-    call free_buffers()
-    capacity = 2*n
+    if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+    box = [extent(:3) - 2*(width - layers), extent(4)]
+    box(e) = layers
+    first = [width - layers + [0, 0, 0], 0]   ! counted from 0
+    start(:, 1) = [width, width - layers]
+    start(:, 2) = [extent(e) - width - layers, extent(e) - width]
+    n = 1 + modulo(n_known, size(known))   ! when all are in use the oldest goes
     do s = 1, 2
-      call MPI_Alloc_mem(int(capacity, MPI_ADDRESS_KIND), MPI_INFO_NULL, outgoing(s))
-      call MPI_Alloc_mem(int(capacity, MPI_ADDRESS_KIND), MPI_INFO_NULL, incoming(s))
+      do i = 1, 2
+        first(e) = start(i, s)
+        if (n_known >= size(known)) call MPI_Type_free(known(n)%part(i, s))
+        call MPI_Type_create_subarray(4, extent, box, first, MPI_ORDER_FORTRAN, element, part(i, s))
+        call MPI_Type_commit(part(i, s))
+      end do
     end do
-  end subroutine grow
-
-  subroutine free_buffers()
-    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
-    integer :: s
-
-    if (capacity == 0) return
-    do s = 1, 2
-      call c_f_pointer(outgoing(s), bytes, [capacity])
-      call MPI_Free_mem(bytes)
-      call c_f_pointer(incoming(s), bytes, [capacity])
-      call MPI_Free_mem(bytes)
-    end do
-    capacity = 0
-  end subroutine free_buffers
-
-  !> First of the layers that side s sends.
-  pure integer function inner(s, m, width, layers)
-    integer, intent(in) :: s, m, width, layers
-
-    inner = merge(width + 1, m - width - layers + 1, s == 1)
-  end function inner
-
-  !> First of the halo layers of side s, those beside the block.
-  pure integer function outer(s, m, width, layers)
-    integer, intent(in) :: s, m, width, layers
-
-    outer = merge(width - layers + 1, m - width + 1, s == 1)
-  end function outer
+    known(n)%key = key
+    known(n)%part = part
+    n_known = n_known + 1
+  end subroutine find_parts
 
   module procedure gather_wp
     real(wp), allocatable :: cells(:)   !! block after block
