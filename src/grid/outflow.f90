@@ -22,7 +22,7 @@ module outflow_m
   implicit none
   private
   public :: outflow_t, outflow_init, start_outflow, update_outflow, resume_outflow
-  public :: outside_distance, side_distance, pressure_outside, mean_velocity
+  public :: side_distance, pressure_outside, mean_velocity
 
   real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
 
@@ -246,21 +246,6 @@ contains
     end function uneven
   end subroutine set_pressure
 
-  !> Length over which the pressure difference to the outside acts: half a cell, and as much water
-  !! as the wave takes along [m].
-  pure function outside_distance(side, at, half, rho) result(length)
-    type(outflow_t), intent(in) :: side
-    integer, intent(in) :: at(3)     !! the cell
-    real(wp), intent(in) :: half     !! half a cell [m]
-    real(wp), intent(in) :: rho      !! density of the cell, that of the system [kg/m3]
-    real(wp) :: length
-
-    length = half
-    if (side%active) then
-      length = half + side%impulse(at(side%along(1)), at(side%along(2)))/rho
-    end if
-  end function outside_distance
-
   !> Pressure outside the side beside a cell, for a face at its mean velocity [Pa].
   pure function pressure_outside(side, at) result(p)
     type(outflow_t), intent(in) :: side
@@ -281,16 +266,20 @@ contains
     if (side%active) u = side%mean(at(side%along(1)), at(side%along(2)))
   end function mean_velocity
 
-  !> Length over which the pressure difference of a cell to the outside acts [m].
+  !> Length over which the pressure difference of a cell to the outside acts: half a cell, and beside
+  !! an outflow as much water as the wave takes along [m].
   pure function side_distance(grid, s, d, cell, rho, sides) result(length)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d, cell(3)
-    real(wp), intent(in) :: rho   !! of the cell [kg/m3]
+    real(wp), intent(in) :: rho   !! of the cell, that of the system [kg/m3]
     type(outflow_t), intent(in), optional :: sides(2, 3)
     real(wp) :: length
 
     length = 0.5_wp*grid%h(d)
-    if (present(sides)) length = outside_distance(sides(s, d), cell, length, rho)
+    if (.not. present(sides)) return
+    associate (side => sides(s, d))
+      if (side%active) length = length + side%impulse(cell(side%along(1)), cell(side%along(2)))/rho
+    end associate
   end function side_distance
 
 end module outflow_m

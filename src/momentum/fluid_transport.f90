@@ -52,42 +52,6 @@ contains
     call momentum_init(grid, self%momentum, case%numerics%advection, pooled=.true.)
   end subroutine fluid_transport_init
 
-  !> Arrays over the cells from the pool, which nobody needs after the transport.
-  subroutine take_arrays(scratch, self)
-    type(scratch_t), intent(inout) :: scratch
-    type(fluid_transport_t), intent(inout) :: self
-
-    associate (volumes => self%liquid%volumes)
-      call take(scratch, volumes%w)
-      call take(scratch, volumes%v)
-      call take(scratch, volumes%c)
-      call take(scratch, volumes%w_before)
-      call take(scratch, volumes%v_before)
-      call take(scratch, volumes%q)
-      call take(scratch, volumes%g)
-    end associate
-    call take_faces(scratch, self%liquid%flux%band%k)
-    if (self%carries_momentum) call take(scratch, self%momentum%momentum)
-  end subroutine take_arrays
-
-  !> And give them back.
-  subroutine give_arrays(scratch, self)
-    type(scratch_t), intent(inout) :: scratch
-    type(fluid_transport_t), intent(inout) :: self
-
-    associate (volumes => self%liquid%volumes)
-      call give(scratch, volumes%w)
-      call give(scratch, volumes%v)
-      call give(scratch, volumes%c)
-      call give(scratch, volumes%w_before)
-      call give(scratch, volumes%v_before)
-      call give(scratch, volumes%q)
-      call give(scratch, volumes%g)
-    end associate
-    call give_faces(scratch, self%liquid%flux%band%k)
-    if (self%carries_momentum) call give(scratch, self%momentum%momentum)
-  end subroutine give_arrays
-
   !> The subcycles of a step and its work arrays.
   subroutine begin_carrying(time_step, scratch, self)
     type(time_step_t), intent(in) :: time_step
@@ -100,7 +64,17 @@ contains
     self%liquid%subcycles = ceiling(min(time_step%courant/subcycle_courant - round_off, &
                                         real(max_subcycles, wp)))
     self%liquid%subcycles = max(self%liquid%subcycles, 1)
-    call take_arrays(scratch, self)
+    associate (volumes => self%liquid%volumes)   ! nobody needs them after the transport
+      call take(scratch, volumes%w)
+      call take(scratch, volumes%v)
+      call take(scratch, volumes%c)
+      call take(scratch, volumes%w_before)
+      call take(scratch, volumes%v_before)
+      call take(scratch, volumes%q)
+      call take(scratch, volumes%g)
+    end associate
+    call take_faces(scratch, self%liquid%flux%band%k)
+    if (self%carries_momentum) call take(scratch, self%momentum%momentum)
   end subroutine begin_carrying
 
   !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
@@ -155,7 +129,7 @@ contains
     q = self%liquid%subcycles*self%liquid%volumes%q
   end subroutine fluxes_of_step
 
-  !> The liquid in the cells and its share C, at the end of the step.
+  !> The liquid in the cells and its share C, at the end of the step; the work arrays go back.
   subroutine finish_carrying(grid, after, flow, scratch, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: after   !! bodies at the end of the step
@@ -164,7 +138,17 @@ contains
     type(fluid_transport_t), intent(inout) :: self
 
     call finish_transport(grid, after, self%liquid, flow)
-    call give_arrays(scratch, self)
+    associate (volumes => self%liquid%volumes)
+      call give(scratch, volumes%w)
+      call give(scratch, volumes%v)
+      call give(scratch, volumes%c)
+      call give(scratch, volumes%w_before)
+      call give(scratch, volumes%v_before)
+      call give(scratch, volumes%q)
+      call give(scratch, volumes%g)
+    end associate
+    call give_faces(scratch, self%liquid%flux%band%k)
+    if (self%carries_momentum) call give(scratch, self%momentum%momentum)
   end subroutine finish_carrying
 
 end module fluid_transport_m

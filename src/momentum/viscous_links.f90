@@ -15,7 +15,7 @@ module viscous_links_m
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall, add_side
+  use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall
   use merged_cells_m, only: merged_cells_t, is_unmerged
   use wall_plane_m, only: distance_of_links
   use wall_layer_m, only: along_share, rough_viscosity
@@ -263,7 +263,11 @@ contains
             if (solid%inside(c(1), c(2), c(3)) /= 0) cycle
             value = 2.0_wp*mu(c(1), c(2), c(3))*grid%area(d)/grid%h(d)
             if (drags(grid%side(s, d))) then
-              call add_side(self, c, value, grid%side_velocity(:, s, d))
+              self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + value
+              if (.not. any(abs(grid%side_velocity(:, s, d)) > 0.0_wp)) cycle
+              self%sides%n = self%sides%n + 1
+              self%sides%cell(:, self%sides%n) = c
+              self%sides%pull(:, self%sides%n) = value*grid%side_velocity(:, s, d)
             else if (is_wall(grid%side(s, d))) then
               self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
             end if

@@ -8,7 +8,7 @@ module viscous_system_m
   use scratch_m, only: scratch_t, take, give
   implicit none
   private
-  public :: viscous_t, wall_links_t, viscous_init, add_wall, bytes_for_walls, set_wall, add_side
+  public :: viscous_t, wall_links_t, viscous_init, add_wall, bytes_for_walls, set_wall
   public :: take_arrays, give_arrays
 
   !> Links between cells and bodies, grouped by body.
@@ -150,19 +150,5 @@ contains
     walls%found_k(n) = k
     walls%found_arm(:, n) = arm
   end subroutine set_wall
-
-  !> Note what a side that may move does to cell c: conductance k and velocity of the side.
-  subroutine add_side(self, c, k, velocity)
-    type(viscous_t), intent(inout) :: self
-    integer, intent(in) :: c(3)
-    real(wp), intent(in) :: k             !! [kg/s]
-    real(wp), intent(in) :: velocity(3)   !! [m/s]
-
-    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
-    if (.not. any(abs(velocity) > 0.0_wp)) return
-    self%sides%n = self%sides%n + 1
-    self%sides%cell(:, self%sides%n) = c
-    self%sides%pull(:, self%sides%n) = k*velocity
-  end subroutine add_side
 
 end module viscous_system_m

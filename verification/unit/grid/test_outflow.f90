@@ -5,7 +5,7 @@ module test_outflow_m
   use case_text_m, only: case_of
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
-  use outflow_m, only: outflow_init, start_outflow, update_outflow, outside_distance, &
+  use outflow_m, only: outflow_init, start_outflow, update_outflow, side_distance, &
     pressure_outside, mean_velocity
   implicit none
   private
@@ -87,12 +87,12 @@ contains
     call check('higher column', pressure_outside(flow%sides(2, 1), [5, 3, 1]), &
                at_rest + g*0.05_wp*(rho_l - rho_g) - g*0.05_wp*rho_l, 1.0e-9_wp)
     c = sqrt(g*0.25_wp)
-    call check('distance in liquid', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
+    call check('distance in liquid', side_distance(grid, 2, 1, [4, 3, 1], rho_l, flow%sides), &
                0.5_wp + c*dt, 1.0e-14_wp)
-    call check('distance in a mixed cell', outside_distance(flow%sides(2, 1), [4, 1, 3], 0.5_wp, &
-               501.0_wp), 0.5_wp + 0.5_wp*rho_l*c*dt/501.0_wp, 1.0e-14_wp)
-    call check('in gas', outside_distance(flow%sides(2, 1), [4, 3, 5], 0.5_wp, rho_g), 0.5_wp)
-    call check('elsewhere', outside_distance(flow%sides(1, 1), [1, 3, 1], 0.5_wp, rho_l), 0.5_wp)
+    call check('distance in a mixed cell', side_distance(grid, 2, 1, [4, 1, 3], &
+               501.0_wp, flow%sides), 0.5_wp + 0.5_wp*rho_l*c*dt/501.0_wp, 1.0e-14_wp)
+    call check('in gas', side_distance(grid, 2, 1, [4, 3, 5], rho_g, flow%sides), 0.5_wp)
+    call check('elsewhere', side_distance(grid, 1, 1, [1, 3, 1], rho_l, flow%sides), 0.5_wp)
   end subroutine level_and_wave
 
   !> The mean velocity starts from that of the faces and follows it in 4 L/c where there is liquid.
@@ -129,7 +129,7 @@ contains
     call make([0.0_wp, 0.0_wp, -g], .true.)
     call update()
     call check('bottom', pressure_outside(flow%sides(2, 1), [5, 1, 1]), 0.45_wp*g*rho_l, 1.0e-9_wp)
-    call check('distance', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), 0.5_wp)
+    call check('distance', side_distance(grid, 2, 1, [4, 3, 1], rho_l, flow%sides), 0.5_wp)
   end subroutine no_level
 
 end module test_outflow_m
