@@ -164,7 +164,7 @@ contains
       call warnings%report(error_unit, 'mics: warning: ')
       return
     end if
-    if (is_root()) call print_plan(output_unit, case, shapes, bed)
+    if (is_root()) call print_plan(case, shapes, bed)
     call find_case_warnings(case, shapes, bed, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')

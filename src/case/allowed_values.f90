@@ -9,10 +9,9 @@ module allowed_values_m
   public :: entry_t, words_of, choices
   public :: allowed_t, any_number, positive, not_negative, share, whole, between
 
-  real(wp), parameter :: boundless = huge(1.0_wp)
 
   type :: allowed_t
-    real(wp) :: low = -boundless, high = boundless
+    real(wp) :: low = -huge(1.0_wp), high = huge(1.0_wp)   !! these: no bound
     logical :: with_low = .true.             !! may the value be `low` itself?
     logical :: whole = .false.
     character(16) :: unit = ''               !! '-' for a pure number, empty for a count
@@ -21,7 +20,6 @@ module allowed_values_m
   contains
     procedure :: problem => allowed_problem
     procedure :: words => allowed_words
-    procedure :: bounded_below, bounded_above
   end type allowed_t
 
   !> One variable of a group.
@@ -105,10 +103,10 @@ contains
     if (all(x > self%low .or. (self%with_low .and. x >= self%low)) .and. all(x <= self%high)) return
     if (self%low > 0.0_wp .and. .not. self%whole .and. any(x <= 0.0_wp)) then
       text = 'must be positive ['//trim(self%unit)//']'
-    else if (self%bounded_above() .and. self%with_low) then
+    else if (self%high < huge(x) .and. self%with_low) then
       text = 'must lie '//self%words()
       if (self%unit /= '-') text = trim(text//' '//self%unit)
-    else if (self%bounded_above() .or. self%whole) then
+    else if (self%high < huge(x) .or. self%whole) then
       text = 'must be '//self%words()
       if (size(x) > 1) text = text//' in each direction'
     else
@@ -125,10 +123,10 @@ contains
     character(:), allocatable :: text
 
     text = ''
-    if (.not. self%bounded_below()) return
-    if (self%bounded_above() .and. self%with_low) then
+    if (self%low <= -huge(self%low)) return
+    if (self%high < huge(self%high) .and. self%with_low) then
       text = 'between '//to_text(self%low)//' and '//to_text(self%high)
-    else if (self%bounded_above()) then
+    else if (self%high < huge(self%high)) then
       text = 'above '//to_text(self%low)//' and at most '//to_text(self%high)
     else if (self%whole) then
       text = to_text(self%low)//' or more'
@@ -139,20 +137,6 @@ contains
       text = 'positive'
     end if
   end function allowed_words
-
-  pure function bounded_below(self) result(yes)
-    class(allowed_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%low > -boundless
-  end function bounded_below
-
-  pure function bounded_above(self) result(yes)
-    class(allowed_t), intent(in) :: self
-    logical :: yes
-
-    yes = self%high < boundless
-  end function bounded_above
 
   !> The value as a case would write it; empty for none.
   pure function entry_value(self) result(text)

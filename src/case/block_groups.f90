@@ -99,6 +99,7 @@ contains
     call v%option('kind', bed%kind, 'heightmap stl', 'what the file holds: a map of heights, or ' &
       //'triangles in m', example='file = ''slope.stl''  kind = ''stl''')
     call v%require('file', len_trim(bed%file) > 0, 'must name a file with the form of the bed')
+    call v%judge('file kind', bed%faulty)
   end subroutine visit_bed
 
   !> `&start`
@@ -186,6 +187,8 @@ contains
       'for physics = ''light'' only: C of the drag on each facet, C/3 of the whole surface for ' &
       //'a compact block; `mics-tools calibrate` fits it to resolved falls', example='0.6')
     call visit_rock(v, shape)
+    call v%judge('name kind size file scale refinement seed variants mass_50 uniformity mass_min ' &
+      //'mass_max elongation blockiness', shape%faulty)
   end subroutine visit_shape
 
   !> The variables of `&shape` that a family of stones has.
@@ -268,6 +271,8 @@ contains
       'moves a fixed block, needs fixed = .true.')
     call v%real('release_time', body%release_time, not_negative('s'), &
       'when the block is let go; before, it displaces and touches nothing', example='2')
+    call v%judge('shape position quaternion axis angle_deg motion', body%faulty)
+    call v%judge('fixed velocity angular_velocity release_time motion', body%time_faulty)
   end subroutine visit_body
 
   !> `&drop`
@@ -319,6 +324,8 @@ contains
       'lowering_speed > 0', 'a block is let go with the speed of lowering')
     call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
       example='0, 0, -0.1')
+    call v%judge('file shape shapes weights position count to first_time interval spread ' &
+      //'orientation quaternion axis angle_deg tilt_deg seed', drop%faulty)
   end subroutine visit_drop
 
   !> What a drop drops: blocks of one shape, or of several drawn by weight.

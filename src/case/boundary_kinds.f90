@@ -30,6 +30,12 @@ module boundary_kinds_m
     boundary_kind_t('inflow',    .false., .false., .true.,  .true.), &
     boundary_kind_t('outflow',   .false., .true.,  .false., .false.)]
 
+  !> What a side of each code is; an array of codes makes one of answers.
+  logical, parameter :: is_wall(0:*) = kind_of%wall
+  logical, parameter :: gives_pressure(0:*) = kind_of%pressure
+  logical, parameter :: gives_velocity(0:*) = kind_of%velocity
+  logical, parameter :: drags(0:*) = kind_of%drag
+
 contains
 
   !> Code of a kind by its name; `no_side` for an unknown one.
@@ -52,37 +58,5 @@ contains
       names = names//' '//trim(kind_of(code)%name)
     end do
   end function side_names
-
-  !> A side that no fluid and no block passes.
-  elemental function is_wall(side) result(yes)
-    integer, intent(in) :: side
-    logical :: yes
-
-    yes = kind_of(side)%wall
-  end function is_wall
-
-  !> A side where the pressure is given half a cell beyond the last cell, so the flow is free.
-  elemental function gives_pressure(side) result(yes)
-    integer, intent(in) :: side
-    logical :: yes
-
-    yes = kind_of(side)%pressure
-  end function gives_pressure
-
-  !> A side where the velocity normal to it is given: none through walls, that of an inflow.
-  elemental function gives_velocity(side) result(yes)
-    integer, intent(in) :: side
-    logical :: yes
-
-    yes = kind_of(side)%velocity
-  end function gives_velocity
-
-  !> A side that the fluid beside it moves along with.
-  elemental function drags(side) result(yes)
-    integer, intent(in) :: side
-    logical :: yes
-
-    yes = kind_of(side)%drag
-  end function drags
 
 end module boundary_kinds_m

@@ -166,50 +166,7 @@ contains
     case default; error stop 'visit_group: a group of the list has no procedure'
     end select
     call v%finish()
-    call mark_faulty(v, case, name, n)
   end subroutine visit_group
-
-  !> Remember what of a group cannot be relied on, so that later checks leave it alone.
-  subroutine mark_faulty(v, input, name, n)
-    type(group_visitor_t), intent(in) :: v
-    type(case_t), intent(inout) :: input
-    character(*), intent(in) :: name
-    integer, intent(in) :: n
-    integer :: s, d
-
-    select case (name)
-    case ('grid')
-      input%grid%cells_faulty = faulty('cells')
-      input%grid%extent_faulty = faulty('length origin')
-    case ('boundary')
-      do d = 1, 3
-        do s = 1, 2
-          input%boundary%faulty(s, d) = faulty(side_name(s, d))
-        end do
-      end do
-    case ('water')
-      input%water(n)%faulty = faulty('min max')
-    case ('shape')
-      input%shape(n)%faulty = faulty('name kind size file scale refinement seed ' &
-        //'variants mass_50 uniformity mass_min mass_max elongation blockiness')
-    case ('body')
-      input%body(n)%faulty = faulty('shape position quaternion axis angle_deg motion')
-      input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time motion')
-    case ('drop')
-      input%drop(n)%faulty = faulty('file shape shapes weights position count to ' &
-        //'first_time interval spread orientation quaternion axis angle_deg tilt_deg seed')
-    case ('bed')
-      input%bed%faulty = faulty('file kind')
-    case default   ! nobody asks about the others
-    end select
-  contains
-    !> Is something wrong with one of these variables?
-    pure logical function faulty(variables)
-      character(*), intent(in) :: variables
-
-      faulty = v%group%faulty .or. .not. v%good(variables)
-    end function faulty
-  end subroutine mark_faulty
 
   !> The names the shapes of the case were given, right or wrong, and those of the stones of
   !! families.
@@ -373,7 +330,7 @@ contains
     i = first_of(list, 'boundary')
     if (i == 0 .or. .not. has_flow(case%run)) return
     call v%start(list(i))
-    way_out = any(gives_pressure(side_code(case%boundary%kind)) .or. case%boundary%faulty)
+    way_out = any(gives_pressure([side_code(case%boundary%kind)])) .or. any(case%boundary%faulty)
     associate (fluid => case%fluid)
       do d = 1, 3
         do s = 1, 2

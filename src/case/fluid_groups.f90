@@ -59,8 +59,9 @@ contains
       example='0, 0, 0', required=.true.)
     call v%real('max', water%max, any_number('m'), 'the upper corner of the box of liquid', &
       example='0.1, 0.1, 0.15', required=.true.)
-    if (.not. (all(is_given(water%min)) .and. all(is_given(water%max)))) return
-    call v%require('max', all(water%max > water%min), 'must be larger than min in every direction')
+    if (all(is_given([water%min, water%max]))) call v%require('max', all(water%max > water%min), &
+      'must be larger than min in every direction')
+    call v%judge('min max', water%faulty)
   end subroutine visit_water
 
   !> `&numerics`

@@ -34,7 +34,7 @@ module group_visitor_m
     character(:), allocatable, private :: left_out   !! names without meaning
     character(:), allocatable, private :: unsure   !! required and missing, or misspelt, it seems
   contains
-    procedure :: start, start_empty, about, finish
+    procedure :: start, start_empty, about, finish, judge
     procedure :: given, good, needed, require, without_meaning, report, pass_over
     procedure :: name, names, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
@@ -93,6 +93,17 @@ contains
       end associate
     end do
   end subroutine finish
+
+  !> The last statement on a group whose geometry is checked later: can some of its variables not be
+  !! relied on?
+  subroutine judge(self, variables, faulty)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variables   !! one blank between them
+    logical, intent(out) :: faulty
+
+    call self%finish()   ! a name that is not known may be meant for one of them
+    faulty = self%group%faulty .or. .not. self%good(variables)
+  end subroutine judge
 
   !> Did the user write this variable?
   pure function given(self, variable) result(yes)

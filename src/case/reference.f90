@@ -113,7 +113,7 @@ contains
         if (entry%most > 1) words = to_text(entry%most)//' '//words//'s'
         if (allowed%fewest > 0) words = to_text(allowed%fewest)//' to '//words
         if (allowed%unit /= '') words = words//' ['//trim(allowed%unit)//']'
-        if (allowed%bounded_below()) words = words//', '//allowed%words()
+        if (allowed%low > -huge(allowed%low)) words = words//', '//allowed%words()
       end associate
     case default
       words = trim(entry%kind)
@@ -206,8 +206,8 @@ contains
         if (allowed%whole) text = '"type": "integer"'
         one = ', "exclusiveMinimum": '
         if (allowed%with_low) one = ', "minimum": '
-        if (allowed%bounded_below()) text = text//one//to_text(allowed%low)
-        if (allowed%bounded_above()) text = text//', "maximum": '//to_text(allowed%high)
+        if (allowed%low > -huge(allowed%low)) text = text//one//to_text(allowed%low)
+        if (allowed%high < huge(allowed%high)) text = text//', "maximum": '//to_text(allowed%high)
       end associate
     case default; text = '"type": "string"'
     end select

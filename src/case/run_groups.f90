@@ -82,13 +82,14 @@ contains
     call v%real('origin', grid%origin, any_number('m'), &
       'the corner of the tank with the lowest x, y and z', example='-0.15, 0, 0')
 
-    if (.not. (v%given('cells') .and. v%given('length') .and. v%good('cells'))) return
-    call v%require('cells', product(real(grid%cells, wp)) <= max_cells, &
-                   'too many cells, at most '//to_text(huge(0))//' in all')
-    if (.not. (v%good('cells') .and. v%good('length'))) return
-    call v%require('origin', &
-                   all(abs(grid%origin) <= farthest_origin*grid%length/real(grid%cells, wp)), &
-                   'too far from zero: cell faces would lose their digits')
+    if (v%given('cells') .and. v%given('length') .and. v%good('cells')) then
+      call v%require('cells', product(real(grid%cells, wp)) <= max_cells, &
+        'too many cells, at most '//to_text(huge(0))//' in all')
+      if (v%good('cells length')) call v%require('origin', all(abs(grid%origin) <= farthest_origin &
+        *grid%length/real(grid%cells, wp)), 'too far from zero: cell faces would lose their digits')
+    end if
+    call v%judge('cells', grid%cells_faulty)
+    call v%judge('length origin', grid%extent_faulty)
   end subroutine visit_grid
 
   !> `&boundary`
@@ -129,6 +130,11 @@ contains
         if (.not. (v%good(side_name(s, d)) .and. v%good(side_name(s, d)//'_velocity'))) cycle
         call require_side_velocity(v, side_name(s, d)//'_velocity', trim(boundary%kind(s, d)), &
                                    boundary%velocity(:, s, d), s, d)
+      end do
+    end do
+    do d = 1, 3
+      do s = 1, 2
+        call v%judge(side_name(s, d), boundary%faulty(s, d))
       end do
     end do
   end subroutine visit_boundary

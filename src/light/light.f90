@@ -131,7 +131,7 @@ contains
     real(wp) :: low(3), high(3), thickness
 
     area = 0.0_wp
-    if (any(gives_pressure(side_code(case%boundary%kind(:, 1:2))))) return
+    if (any(gives_pressure([side_code(case%boundary%kind(:, 1:2))]))) return
     area = product(case%grid%length(1:2))
     if (.not. bed%there) return
     low = case%grid%origin

@@ -1,5 +1,6 @@
 !> What `--check` prints: what a run of this case will do, before anything is done.
 module case_plan_m
+  use, intrinsic :: iso_fortran_env, only: output_unit
   use kinds_m, only: wp, i8
   use vectors_m, only: cube_root, norm
   use errors_m, only: to_text, brief
@@ -40,9 +41,8 @@ module case_plan_m
 
 contains
 
-  !> Print the plan of a checked case.
-  subroutine print_plan(unit, case, shapes, bed)
-    integer, intent(in) :: unit
+  !> Print the plan of a checked case on standard output.
+  subroutine print_plan(case, shapes, bed)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
@@ -55,59 +55,57 @@ contains
     with_blocks = case%run%physics /= 'fluid'
     call blocks_init(case, shapes, blocks)
     call count_contact_features(case, shapes, n_points, d_s)
-    call print_run(unit, case)
-    call print_grid(unit, case, wet)
-    if (bed%there) call entry(unit, 'bed from', file_text(trim(case%bed%file))//', ' &
+    call print_run(case)
+    call print_grid(case, wet)
+    if (bed%there) call entry('bed from', file_text(trim(case%bed%file))//', ' &
       //to_text(bed%n_given)//' facets, heights from '//place_text(minval(bed%point(3, :)), &
       case%grid%length)//' to '//place_text(maxval(bed%point(3, :)), case%grid%length)//' m')
-    if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
-    if (with_blocks) call print_shapes(unit, case, shapes, n_points)
-    if (with_blocks) call print_bodies(unit, case, blocks, bed)
-    call print_steps(unit, case, blocks, d_s, wet)
-    call print_memory(unit, case, shapes, bed)
-    call print_files(unit, case, wet)
+    if (case%run%physics /= 'dry') call print_liquid(case, bed)
+    if (with_blocks) call print_shapes(case, shapes, n_points)
+    if (with_blocks) call print_bodies(case, blocks, bed)
+    call print_steps(case, blocks, d_s, wet)
+    call print_memory(case, shapes, bed)
+    call print_files(case, wet)
   end subroutine print_plan
 
-  subroutine print_run(unit, case)
-    integer, intent(in) :: unit
+  subroutine print_run(case)
     type(case_t), intent(in) :: case
 
-    call heading(unit, 'Run')
-    if (len_trim(case%run%title) > 0) call entry(unit, 'title', case%run%title)
+    call heading('Run')
+    if (len_trim(case%run%title) > 0) call entry('title', case%run%title)
     select case (case%run%physics)
-    case ('coupled'); call entry(unit, 'physics', 'coupled: water, air and blocks')
-    case ('fluid'); call entry(unit, 'physics', 'fluid: water and air, no blocks')
-    case ('light'); call entry(unit, 'physics', not_resolved//'; blocks in a given water')
-    case default; call entry(unit, 'physics', 'dry: blocks alone')
+    case ('coupled'); call entry('physics', 'coupled: water, air and blocks')
+    case ('fluid'); call entry('physics', 'fluid: water and air, no blocks')
+    case ('light'); call entry('physics', not_resolved//'; blocks in a given water')
+    case default; call entry('physics', 'dry: blocks alone')
     end select
-    call entry(unit, 'simulated time', brief(case%run%t_end)//' s')
+    call entry('simulated time', brief(case%run%t_end)//' s')
     if (case%run%stop_when_settled) then
-      call entry(unit, 'ends early', 'when every block is slower than ' &
+      call entry('ends early', 'when every block is slower than ' &
         //brief(case%run%rest_speed) &
         //' m/s for '//brief(case%run%rest_time)//' s')
     end if
   end subroutine print_run
 
-  subroutine print_grid(unit, case, wet)
-    integer, intent(in) :: unit
+  subroutine print_grid(case, wet)
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
     character(1), parameter :: axis(3) = ['x', 'y', 'z']
     integer :: d
 
-    call heading(unit, 'Tank')
-    call entry(unit, 'length', triple(case%grid%length)//' m')
-    call entry(unit, 'lower corner', place(1)//', '//place(2)//', '//place(3)//' m')
+    call heading('Tank')
+    call entry('length', triple(case%grid%length)//' m')
+    call entry('lower corner', place(1)//', '//place(2)//', '//place(3)//' m')
     do d = 1, 3
-      call entry(unit, 'sides in '//axis(d), trim(case%boundary%kind(1, d))//' and ' &
+      call entry('sides in '//axis(d), trim(case%boundary%kind(1, d))//' and ' &
                  //trim(case%boundary%kind(2, d)))
     end do
     if (.not. wet) return
     associate (n => case%grid%cells)
-      call entry(unit, 'cells', to_text(n(1))//' x '//to_text(n(2))//' x '//to_text(n(3))//' = ' &
+      call entry('cells', to_text(n(1))//' x '//to_text(n(2))//' x '//to_text(n(3))//' = ' &
                  //to_text(product(n)))
     end associate
-    call entry(unit, 'spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
+    call entry('spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
   contains
     function place(d) result(text)
       integer, intent(in) :: d
@@ -117,28 +115,27 @@ contains
     end function place
   end subroutine print_grid
 
-  subroutine print_liquid(unit, case, bed)
-    integer, intent(in) :: unit
+  subroutine print_liquid(case, bed)
     type(case_t), intent(in) :: case
     type(bed_t), intent(in) :: bed
     character(:), allocatable :: without
     real(wp) :: height, volume, high(3)
 
-    call heading(unit, 'Fluid')
+    call heading('Fluid')
     if (.not. has_flow(case%run)) then
-      call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3')
-      call entry(unit, 'water level', place_text(case%fluid%water_level, case%grid%length) &
+      call entry('liquid', brief(case%fluid%liquid_density)//' kg/m3')
+      call entry('water level', place_text(case%fluid%water_level, case%grid%length) &
                  //' m; rises by what is displaced, if no side is open')
-      call entry(unit, 'current', triple(case%fluid%velocity, ', ')//' m/s')
+      call entry('current', triple(case%fluid%velocity, ', ')//' m/s')
       return
     end if
-    call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3, ' &
+    call entry('liquid', brief(case%fluid%liquid_density)//' kg/m3, ' &
                //brief(case%fluid%liquid_viscosity)//' Pa s')
     if (case%fluid%single_phase) then
-      call entry(unit, 'liquid at the start', 'everywhere, single phase')
+      call entry('liquid at the start', 'everywhere, single phase')
       return
     end if
-    call entry(unit, 'gas', brief(case%fluid%gas_density)//' kg/m3, ' &
+    call entry('gas', brief(case%fluid%gas_density)//' kg/m3, ' &
                //brief(case%fluid%gas_viscosity)//' Pa s')
     if (is_given(case%fluid%water_level)) then
       height = min(max(case%fluid%water_level - case%grid%origin(3), 0.0_wp), case%grid%length(3))
@@ -150,28 +147,27 @@ contains
         volume = volume - bed_volume(bed, case%grid%origin, high)
         without = ' without the bed'//without
       end if
-      call entry(unit, 'water level', place_text(case%fluid%water_level, case%grid%length)//' m; ' &
+      call entry('water level', place_text(case%fluid%water_level, case%grid%length)//' m; ' &
                  //brief(volume)//' m3 below it'//without)
     end if
     if (size(case%water) == 1 .and. .not. bed%there) then
       volume = product(max(0.0_wp, min(case%water(1)%max, case%grid%origin + case%grid%length) &
         - max(case%water(1)%min, case%grid%origin)))
-      call entry(unit, 'boxes of liquid', '1, '//brief(volume)//' m3, bodies included')
+      call entry('boxes of liquid', '1, '//brief(volume)//' m3, bodies included')
     else if (size(case%water) > 0) then
-      call entry(unit, 'boxes of liquid', to_text(size(case%water)))
+      call entry('boxes of liquid', to_text(size(case%water)))
     end if
     if (len(case%fluid%initial_state) > 0) then
-      call entry(unit, 'initial state', 'from ' &
+      call entry('initial state', 'from ' &
                  //file_text(case%fluid%initial_state))
     else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
-      call entry(unit, 'water level', 'none: no liquid at all')
+      call entry('water level', 'none: no liquid at all')
     end if
   end subroutine print_liquid
 
   !> A table with one line for each shape: its tetrahedra, what of it touches (points and the
   !! smallest edge of the form, or spheres and the smallest diameter), mass and weight.
-  subroutine print_shapes(unit, case, shapes, n_points)
-    integer, intent(in) :: unit
+  subroutine print_shapes(case, shapes, n_points)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     integer, intent(in) :: n_points(:)   !! points or spheres of each
@@ -182,12 +178,12 @@ contains
     integer :: s
 
     if (size(shapes) == 0) return
-    call heading(unit, 'Shapes')
+    call heading('Shapes')
     if (case%contact%model == 'surface') then
-      write (unit, form) left('name', 14), left('kind', 9), 'tets', 'points', 'edge [m]', &
+      write (output_unit, form) left('name', 14), left('kind', 9), 'tets', 'points', 'edge [m]', &
         'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     else
-      write (unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
+      write (output_unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
         'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     end if
     g = norm(case%fluid%gravity)
@@ -199,20 +195,20 @@ contains
         *shapes(s)%volume)*g)
       smallest = 2*minval(shapes(s)%sphere_radius)
       if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
-      write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
+      write (output_unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
         to_text(size(shapes(s)%tet, 2)), to_text(n_points(s)), brief(smallest), &
         brief(shapes(s)%volume), brief(mass), brief(mass*g), submerged
     end do
     do s = 1, size(shapes)
-      if (shapes(s)%kind == 'file') call entry(unit, trim(shapes(s)%name)//' from', &
+      if (shapes(s)%kind == 'file') call entry(trim(shapes(s)%name)//' from', &
         file_text(case%shape(s)%file)//', ' &
         //triple(maxval(shapes(s)%point, 2) - minval(shapes(s)%point, 2))//' m, ' &
         //to_text(size(shapes(s)%facet) - 1)//' facets')   ! its length shows a wrong unit
-      if (case%shape(s)%member == 1) call print_family(unit, pack(shapes, shapes%family &
+      if (case%shape(s)%member == 1) call print_family(pack(shapes, shapes%family &
         == shapes(s)%family))
       if (case%run%physics == 'light' .and. extreme_of_family(shapes, s)) then
         added = added_inertia_of(shapes(s))
-        call entry(unit, trim(shapes(s)%name)//' in water', 'added mass '//brief(added%mass, 3) &
+        call entry(trim(shapes(s)%name)//' in water', 'added mass '//brief(added%mass, 3) &
           //' and inertia '//brief(added%inertia, 2)//' of the displaced, drag coefficient ' &
           //brief(case%shape(s)%drag_coefficient)//' on the facets')
       end if
@@ -220,8 +216,7 @@ contains
   end subroutine print_shapes
 
   !> The stones of a family; the table has its lightest and its heaviest.
-  subroutine print_family(unit, stones)
-    integer, intent(in) :: unit
+  subroutine print_family(stones)
     type(shape_t), intent(in) :: stones(:)
     real(wp) :: mass(size(stones))
     logical :: heavier(size(stones))
@@ -235,13 +230,12 @@ contains
       if (2*count(heavier) <= size(mass)) half(1) = min(half(1), mass(s))
       if (2*sum(mass, heavier) <= sum(mass)) half(2) = min(half(2), mass(s))
     end do
-    call entry(unit, trim(stones(1)%family), to_text(size(stones))//' stones of '//brief(sum(mass) &
+    call entry(trim(stones(1)%family), to_text(size(stones))//' stones of '//brief(sum(mass) &
       /real(size(mass), wp))//' kg on average; half of the stones up to '//brief(half(1)) &
       //' kg, half of the mass up to '//brief(half(2))//' kg')
   end subroutine print_family
 
-  subroutine print_bodies(unit, case, blocks, bed)
-    integer, intent(in) :: unit
+  subroutine print_bodies(case, blocks, bed)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
     type(bed_t), intent(in) :: bed
@@ -249,18 +243,18 @@ contains
     integer :: n_fixed, n_moved, i
 
     n_fixed = count(case%body%fixed)
-    call heading(unit, 'Bodies')
-    call entry(unit, 'fixed', to_text(n_fixed))
-    call entry(unit, 'free', to_text(size(case%body) - n_fixed))
+    call heading('Bodies')
+    call entry('fixed', to_text(n_fixed))
+    call entry('free', to_text(size(case%body) - n_fixed))
     associate (n => size(case%body))
       if (blocks%n == n) then
-        call entry(unit, 'dropped', '0')
+        call entry('dropped', '0')
       else
-        call entry(unit, 'dropped', to_text(blocks%n - n)//', the last one at ' &
+        call entry('dropped', to_text(blocks%n - n)//', the last one at ' &
                    //brief(maxval(blocks%release_time(n + 1:)))//' s')
       end if
     end associate
-    if (case%begun%n > 0) call entry(unit, 'begin elsewhere', to_text(case%begun%n)//', where ' &
+    if (case%begun%n > 0) call entry('begin elsewhere', to_text(case%begun%n)//', where ' &
       //file_text(case%start%file)//' left them at '//brief(case%begun%time) &
       //' s')
     n_moved = 0
@@ -270,16 +264,15 @@ contains
       n_moved = n_moved + 1
       fastest = max(fastest, fastest_between(case%body(i)%path, 0.0_wp, case%run%t_end))
     end do
-    if (n_moved > 0) call entry(unit, 'moved by a table', to_text(n_moved)//', up to ' &
+    if (n_moved > 0) call entry('moved by a table', to_text(n_moved)//', up to ' &
       //brief(fastest(1))//' m/s and '//brief(fastest(2))//' rad/s')
-    call print_rise(unit, case, blocks, bed)
+    call print_rise(case, blocks, bed)
   end subroutine print_bodies
 
   !> The level when all that comes later is under water: it rises by the volume of that over the
   !! area of the tank, but not where water can leave through a side, nor where a bed reaches out of
   !! it.
-  subroutine print_rise(unit, case, blocks, bed)
-    integer, intent(in) :: unit
+  subroutine print_rise(case, blocks, bed)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
     type(bed_t), intent(in) :: bed
@@ -291,8 +284,8 @@ contains
     keeps = case%run%physics == 'light'
     if (has_flow(case%run)) keeps = len_trim(case%fluid%initial_state) == 0 &
       .and. .not. case%fluid%single_phase .and. is_given(case%fluid%water_level)
-    if (any(gives_pressure(side_code(case%boundary%kind(:, 1:2))) &
-        .or. case%boundary%kind(:, 1:2) == 'inflow') &
+    if (any(gives_pressure([side_code(case%boundary%kind(:, 1:2))])) &
+        .or. any(case%boundary%kind(:, 1:2) == 'inflow') &
         .or. gives_pressure(side_code(case%boundary%kind(1, 3))) .or. .not. keeps) return
     if (bed%there) then
       if (maxval(bed%point(3, :)) > case%fluid%water_level) return
@@ -307,42 +300,41 @@ contains
     text = 'rises by '//brief(rise)//' m if all that comes later ends under water'
     if (case%fluid%water_level + rise > case%grid%origin(3) + case%grid%length(3)) text = text &
       //', over the top of the tank'
-    call entry(unit, 'water level', text)
+    call entry('water level', text)
   end subroutine print_rise
 
   !> What limits the steps of the fluid and of the bodies.
-  subroutine print_steps(unit, case, blocks, d_s, wet)
-    integer, intent(in) :: unit
+  subroutine print_steps(case, blocks, d_s, wet)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     logical, intent(in) :: wet
     real(wp) :: h, limit
 
-    call heading(unit, 'Time steps')
-    call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
+    call heading('Time steps')
+    call entry('largest', brief(case%run%dt)//' s, at least ' &
                //count_text(max(1.0_wp, case%run%t_end/case%run%dt))//' steps')
-    call entry(unit, 'time of the run', 'about '//time_text(wet, case, blocks) &
+    call entry('time of the run', 'about '//time_text(wet, case, blocks) &
                //' or more on one core')
     h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
       if (case%run%cfl_max > 0.0_wp) then
-        call entry(unit, 'Courant limit', brief(case%run%cfl_max*h/speed)//' s at '//brief(speed) &
+        call entry('Courant limit', brief(case%run%cfl_max*h/speed)//' s at '//brief(speed) &
                    //' m/s, Courant number '//brief(case%run%cfl_max))
       else
-        call entry(unit, 'Courant limit', 'none, dt is kept')
+        call entry('Courant limit', 'none, dt is kept')
       end if
       if (gravity_step(case%fluid, h) < huge(h)) then
-        call entry(unit, 'shortest waves', brief(gravity_step(case%fluid, h))//' s')
+        call entry('shortest waves', brief(gravity_step(case%fluid, h))//' s')
       end if
       if (capillary_step(case%fluid, h) < huge(h)) then
-        call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')
+        call entry('surface tension', brief(capillary_step(case%fluid, h))//' s')
       end if
       limit = viscous_step(case%fluid, sum((case%grid%cells/case%grid%length)**2, &
         case%grid%cells > 1))
-      if (limit < case%run%dt) call entry(unit, 'viscous surface', brief(limit)//' s')
+      if (limit < case%run%dt) call entry('viscous surface', brief(limit)//' s')
     end if
-    if (case%run%physics /= 'fluid' .and. size(blocks%shapes) > 0) call print_body_steps(unit, &
+    if (case%run%physics /= 'fluid' .and. size(blocks%shapes) > 0) call print_body_steps(&
       case, blocks%shapes, d_s)
   end subroutine print_steps
 
@@ -397,8 +389,7 @@ contains
   end function block_seconds
 
   !> Limits of the body steps, and how far the lightest shape gives way.
-  subroutine print_body_steps(unit, case, shapes, d_s)
-    integer, intent(in) :: unit
+  subroutine print_body_steps(case, shapes, d_s)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
@@ -413,11 +404,11 @@ contains
     ratio_step = contact%substep_ratio*case%run%dt
     time_step = case%contact%contact_time/substeps_per_contact
     courant_step = case%contact%courant_max*d_s/speed
-    call entry(unit, 'body step', brief(min(ratio_step, time_step, courant_step)) &
+    call entry('body step', brief(min(ratio_step, time_step, courant_step)) &
                //' s, the smallest of')
-    call entry(unit, '  share of dt', brief(ratio_step)//' s')
-    call entry(unit, '  contact time / 20', brief(time_step)//' s')
-    call entry(unit, '  contact Courant', brief(courant_step)//' s at '//brief(speed) &
+    call entry('  share of dt', brief(ratio_step)//' s')
+    call entry('  contact time / 20', brief(time_step)//' s')
+    call entry('  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
     call choose_law(case%contact, law)
     heaviest = load_of(heaviest_mass(case, shapes), norm(case%fluid%gravity))
@@ -427,16 +418,15 @@ contains
       k = law%normal_constant(mass, heaviest, rest_overlap_share*shapes(s)%smallest_edge)
       units = ' N/m'
       if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) units = ' N/m^'//brief(law%gamma_n)
-      call entry(unit, 'stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))
+      call entry('stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))
       if (units /= ' N/m') cycle
-      call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
+      call entry('', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
                  //' m/s, '//brief(mass*norm(case%fluid%gravity)/k)//' m at rest')
     end do
   end subroutine print_body_steps
 
   !> Estimate of the memory of all processes together, and what there is.
-  subroutine print_memory(unit, case, shapes, bed)
-    integer, intent(in) :: unit
+  subroutine print_memory(case, shapes, bed)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
@@ -450,13 +440,12 @@ contains
     if (planned <= available) text = text//' of'
     if (available > 0) text = text//' '//size_text(real(available, wp)) &
       //' that this machine has left'
-    call heading(unit, 'Memory')
-    call entry(unit, 'about', text)
+    call heading('Memory')
+    call entry('about', text)
   end subroutine print_memory
 
   !> Files to come, with upper bounds of their size (fields and surfaces are compressed).
-  subroutine print_files(unit, case, wet)
-    integer, intent(in) :: unit
+  subroutine print_files(case, wet)
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
     real(wp), parameter :: min_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
@@ -470,22 +459,22 @@ contains
     frames = 0.0_wp
     if (case%run%field_interval > 0.0_wp) frames = written(case%run%field_interval)
     rows = written(case%run%history_interval)
-    call heading(unit, 'Files in '//case%run%output)
-    call entry(unit, 'run.h5', 'history of '//to_text(n)//' bodies, '//count_text(rows) &
+    call heading('Files in '//case%run%output)
+    call entry('run.h5', 'history of '//to_text(n)//' bodies, '//count_text(rows) &
                //' rows or more, '//size_text(min_bytes &
                + rows*(series_bytes + body_bytes*real(n, wp))))
     if (frames > 0.0_wp .and. wet) then
-      call entry(unit, 'fields.vtkhdf', count_text(frames)//' frames, at most ' &
+      call entry('fields.vtkhdf', count_text(frames)//' frames, at most ' &
                  //size_text(frames*cell_bytes*product(real(case%grid%cells, wp))))
     end if
     if (frames > 0.0_wp .and. n > 0) then
-      call entry(unit, 'blocks.vtkhdf', count_text(frames)//' frames')
+      call entry('blocks.vtkhdf', count_text(frames)//' frames')
     end if
     if (case%run%restart_interval > 0.0_wp) then
-      call entry(unit, 'restart-a.h5, -b.h5', 'in turn, every ' &
+      call entry('restart-a.h5, -b.h5', 'in turn, every ' &
                  //brief(case%run%restart_interval)//' s')
     else
-      call entry(unit, 'restart-a.h5', 'at the end')
+      call entry('restart-a.h5', 'at the end')
     end if
   contains
     !> How often something is written at the start, at an interval and at the end, in steps of dt.

@@ -1,5 +1,6 @@
 !> How the plan of a case is laid out: headings, and lines of a name and a text.
 module plan_text_m
+  use, intrinsic :: iso_fortran_env, only: output_unit
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use value_text_m, only: fixed_text
@@ -11,19 +12,17 @@ module plan_text_m
 
 contains
 
-  subroutine heading(unit, text)
-    integer, intent(in) :: unit
+  subroutine heading(text)
     character(*), intent(in) :: text
 
-    write (unit, '(a)') text
+    write (output_unit, '(a)') text
   end subroutine heading
 
   !> One line: a name and what is to be said about it.
-  subroutine entry(unit, name, text)
-    integer, intent(in) :: unit
+  subroutine entry(name, text)
     character(*), intent(in) :: name, text
 
-    write (unit, '(2x, a, a)') left(name, label_width), trim(text)
+    write (output_unit, '(2x, a, a)') left(name, label_width), trim(text)
   end subroutine entry
 
   !> Text with blanks behind it, cut or filled to a width.

@@ -247,7 +247,6 @@ NO_CONSTANTS = {
     "blocks/contact_response.f90": {"share"},
     # marks for "none"
     "shapes/surface_search.f90": {"nowhere"},
-    "case/allowed_values.f90": {"boundless"},
     "case/case_types.f90": {"absent"},
     "liquid/extended_fraction.f90": {"unknown"},
     "liquid/liquid_fill.f90": {"no_surface"},
