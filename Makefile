@@ -233,7 +233,7 @@ paper-ensemble:
 # What the program says about its own input.
 reference:
 	@$(MAKE) --no-print-directory
-	@$(PYTHON) tools/write_reference.py > docs/reference.md
+	@$(PYTHON) tools/write_reference.py
 	./mics --help=json > docs/mics-case.schema.json
 
 docs:

@@ -1,53 +1,28 @@
-"""Print the page docs/reference.md from what ./mics says of its case files; see `make reference`."""
+"""Write docs/reference.md anew below its head, from what ./mics says of its case files."""
 
 import json
 import subprocess
 from pathlib import Path
 
-_PROGRAM = Path(__file__).resolve().parents[1] / "mics"
-_HEAD = """\
-# The case file: every group and variable
-
-Written by `make reference` from the lines of `src/case` that read and check a case; do not edit.
-`./mics --help GROUP` prints the same. `docs/mics-case.schema.json` holds it as a JSON schema: the
-page of `mics-tools report` takes the defaults from it, and Python checks a case by it with the
-packages f90nml and jsonschema:
-
-```python
-import json, f90nml, jsonschema
-case = f90nml.read('input/blocks.nml')
-case = {k: [dict(g) for g in v] if isinstance(v, list) else dict(v)
-        for k, v in case.items()}
-jsonschema.validate(case, json.load(open('docs/mics-case.schema.json')))
-```
-
-SI units; angles in degrees where a name ends in `_deg`.
-"""
-_TABLE = """
-## &{group}
-
-{meaning}.
-
-| variable | values | default | unit | meaning | example |
-|---|---|---|---|---|---|
-"""
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "reference.md"
+_HEAD = "| variable | values | default | unit | meaning | example |\n|---|---|---|---|---|---|\n"
 
 
 def ask(topic: str) -> str:
     """What the program prints about a topic."""
-    return subprocess.run(
-        [_PROGRAM, f"--help={topic}"], capture_output=True, text=True, check=True
-    ).stdout
+    words = [ROOT / "mics", f"--help={topic}"]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout
 
 
 def page() -> str:
     """The page, with a table for each group."""
-    schema, text = json.loads(ask("json")), _HEAD
+    text, schema = PAGE.read_text().split("\n## &")[0], json.loads(ask("json"))
     for group, about in schema["$defs"].items():
         meaning = about["description"][0].upper() + about["description"][1:]
         if "anyOf" in schema["properties"][group]:
             meaning += "; a case may hold any number of these groups"
-        text += _TABLE.format(group=group, meaning=meaning)
+        text += f"\n## &{group}\n\n{meaning}.\n\n{_HEAD}"
         paragraphs = ask(group).split("\n\n")[1:]
         for (name, rule), said in zip(about["properties"].items(), paragraphs, strict=True):
             unit = rule.get("unit", "")
@@ -62,4 +37,4 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    print(page(), end="")
+    PAGE.write_text(page())

@@ -16,9 +16,8 @@ from micstools.cases.initial_state import write_initial_state
 from micstools.reading.reader import Run
 from run_cases import ROOT
 from test_input import GOOD, mics
-from write_reference import ask, page
+from write_reference import PAGE, ask, page
 
-PAGE = ROOT / "docs" / "reference.md"
 SCHEMA = ROOT / "docs" / "mics-case.schema.json"
 
 SIDES = [f"{axis}_{end}" for axis in "xyz" for end in ("min", "max")]
@@ -48,20 +47,18 @@ class Row(NamedTuple):
 @pytest.fixture(scope="module")
 def rows() -> list[Row]:
     """All variables as the program tells them."""
-    found, group = [], ""
-    for line in page().splitlines():
-        if line.startswith("## &"):
-            group = line.removeprefix("## &")
-        elif line.startswith("| `"):
-            found.append(Row(group, *(cell.strip("` ") for cell in line[1:-1].split(" | "))))
-    return found
+    return [
+        Row(text.split("\n")[0], *(cell.strip("` ") for cell in line[1:-1].split(" | ")))
+        for text in page().split("\n## &")[1:]
+        for line in text.splitlines()
+        if line.startswith("| `")
+    ]
 
 
 @pytest.fixture(scope="module")
 def schema() -> dict[str, Any]:
     """The schema as the program prints it."""
-    found: dict[str, Any] = json.loads(ask("json"))
-    return found
+    return json.loads(ask("json"))
 
 
 def test_files_are_fresh() -> None:

@@ -175,9 +175,10 @@ contains
     end do
   end procedure fill_integer
 
-  !> Layers that pass through the two sides of direction e: all of the block in the other directions,
-  !! with as many layers of its halos. Message s leaves through side s (1 lower, 2 upper) and comes
-  !! in through the other. MPI takes longer to describe layers than to send them, so they are kept.
+  !> Layers that pass through the two sides of direction e: all of the block in the other
+  !! directions, with as many layers of its halos. Message s leaves through side s (1 lower, 2
+  !! upper) and comes in through the other. MPI takes longer to describe layers than to send them,
+  !! so they are kept.
   subroutine find_parts(extent, width, layers, e, element, part)
     integer, intent(in) :: extent(4), width, layers, e
     type(MPI_Datatype), intent(in) :: element

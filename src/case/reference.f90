@@ -2,8 +2,8 @@
 !! JSON schema for programs. Both come from the procedures that read a case.
 !!
 !! In the schema a case is an object of groups, a group an object of variables; several groups of
-!! one name are an array of objects, a list of values is an array. Reports take the defaults from it,
-!! and `tools/write_reference.py` makes the page docs/reference.md of both.
+!! one name are an array of objects, a list of values is an array. Reports take the defaults from
+!! it, and `tools/write_reference.py` makes the page docs/reference.md of both.
 module reference_m
   use kinds_m, only: name_length
   use allowed_values_m, only: entry_t, choices, words_of
@@ -174,7 +174,7 @@ contains
           back=.true.) + 3:), entry%most > 1)//']}'
       end associate
     end do
-    text = '{"type": "object", "description": '//quoted(v%meaning)//', "additionalProperties": false'
+    text = '{"type": "object", "additionalProperties": false, "description": '//quoted(v%meaning)
     if (v%ways /= '') then
       rest = v%ways//'|'
       needed = ''

@@ -266,8 +266,8 @@ contains
     if (side%active) u = side%mean(at(side%along(1)), at(side%along(2)))
   end function mean_velocity
 
-  !> Length over which the pressure difference of a cell to the outside acts: half a cell, and beside
-  !! an outflow as much water as the wave takes along [m].
+  !> Length over which the pressure difference of a cell to the outside acts: half a cell, and at an
+  !! outflow as much water as the wave takes along [m].
   pure function side_distance(grid, s, d, cell, rho, sides) result(length)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d, cell(3)
@@ -278,7 +278,8 @@ contains
     length = 0.5_wp*grid%h(d)
     if (.not. present(sides)) return
     associate (side => sides(s, d))
-      if (side%active) length = length + side%impulse(cell(side%along(1)), cell(side%along(2)))/rho
+      if (.not. side%active) return
+      length = length + side%impulse(cell(side%along(1)), cell(side%along(2)))/rho
     end associate
   end function side_distance
 

@@ -81,8 +81,7 @@ contains
     end select
     call entry('simulated time', brief(case%run%t_end)//' s')
     if (case%run%stop_when_settled) then
-      call entry('ends early', 'when every block is slower than ' &
-        //brief(case%run%rest_speed) &
+      call entry('ends early', 'when every block is slower than '//brief(case%run%rest_speed) &
         //' m/s for '//brief(case%run%rest_time)//' s')
     end if
   end subroutine print_run
@@ -158,8 +157,7 @@ contains
       call entry('boxes of liquid', to_text(size(case%water)))
     end if
     if (len(case%fluid%initial_state) > 0) then
-      call entry('initial state', 'from ' &
-                 //file_text(case%fluid%initial_state))
+      call entry('initial state', 'from '//file_text(case%fluid%initial_state))
     else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
       call entry('water level', 'none: no liquid at all')
     end if
@@ -173,19 +171,17 @@ contains
     integer, intent(in) :: n_points(:)   !! points or spheres of each
     character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
     type(added_inertia_t) :: added
+    character(10) :: touching(2)   ! what touches, and its size
     character(:), allocatable :: submerged
     real(wp) :: mass, g, smallest
     integer :: s
 
     if (size(shapes) == 0) return
     call heading('Shapes')
-    if (case%contact%model == 'surface') then
-      write (output_unit, form) left('name', 14), left('kind', 9), 'tets', 'points', 'edge [m]', &
-        'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
-    else
-      write (output_unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
-        'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
-    end if
+    touching = ['spheres   ', 'sphere [m]']
+    if (case%contact%model == 'surface') touching = ['points    ', 'edge [m]  ']
+    write (output_unit, form) left('name', 14), left('kind', 9), 'tets', trim(touching(1)), &
+      trim(touching(2)), 'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     g = norm(case%fluid%gravity)
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
@@ -255,8 +251,7 @@ contains
       end if
     end associate
     if (case%begun%n > 0) call entry('begin elsewhere', to_text(case%begun%n)//', where ' &
-      //file_text(case%start%file)//' left them at '//brief(case%begun%time) &
-      //' s')
+      //file_text(case%start%file)//' left them at '//brief(case%begun%time)//' s')
     n_moved = 0
     fastest = 0.0_wp
     do i = 1, size(case%body)
