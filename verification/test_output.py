@@ -454,7 +454,7 @@ def test_max_wall(wet: Path, tmp_path: Path) -> None:
     limit = ("--max-wall", "0:00:01", "--threads", "1", "--quiet", "--output")
     run = call(MICS, *limit, output, LONG, timeout=60)
     assert run.returncode == 143
-    assert "stopped as --max-wall asks" in run.stderr
+    assert "stopped as --max-wall asks" in run.stderr and " --max-wall 0:00:01 " in run.stderr
     assert time.monotonic() - began < 5.0
     assert list(output.glob("restart-?.h5"))
 
@@ -472,15 +472,16 @@ def test_how_to_go_on_with_a_case_from_standard_input(tmp_path: Path) -> None:
     output = tmp_path / "run"
     with CASE.open() as case:
         process = subprocess.Popen(
-            [MICS, "--output", output], stdin=case, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
+            [MICS, "--max-wall", "12:30", "--output", output], stdin=case,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
         while not has_rows(output, 4) and process.poll() is None:
             time.sleep(0.002)
         process.terminate()
         table, said = (text.decode() for text in process.communicate(timeout=60))
     if process.returncode == 0:
         pytest.skip("the run was faster than the signal")
-    assert f"{MICS} --restart {output}/restart-a.h5 < CASE" in said
+    assert f"{MICS} --restart {output}/restart-a.h5 --max-wall 12:30 < CASE" in said
     assert "at t = 0.0" in table  # a digit before the point
 
 

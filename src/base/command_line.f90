@@ -6,8 +6,7 @@ module command_line_m
   use value_text_m, only: nearest_name, parse_integer, sanitise, value_ok
   implicit none
   private
-  public :: options_t, argument_t, read_command_line, parse_arguments, print_help
-  public :: restart_command
+  public :: options_t, read_command_line, print_help, restart_command
 
   type :: options_t
     logical :: check = .false.       !! read, validate, print the plan, write nothing
@@ -23,11 +22,6 @@ module command_line_m
     character(:), allocatable :: output      !! folder, empty: as the case says
   end type options_t
 
-  !> One word of the command line.
-  type :: argument_t
-    character(:), allocatable :: text
-  end type argument_t
-
   integer, parameter :: max_threads = 1024
   character(*), parameter :: allowed_threads = 'must be a whole number from 1 to 1024'
 
@@ -40,31 +34,8 @@ contains
   subroutine read_command_line(options, problems)
     type(options_t), intent(out) :: options
     type(problems_t), intent(inout) :: problems
-    type(argument_t) :: arguments(command_argument_count())
-    integer :: i, length, threads
-
-    do i = 1, size(arguments)
-      call get_command_argument(i, length=length)
-      allocate (character(length) :: arguments(i)%text)
-      call get_command_argument(i, arguments(i)%text)
-      if (sanitise(arguments(i)%text) /= arguments(i)%text) call problems%add_message( &
-        'control characters in '//arguments(i)%text)
-    end do
-    call parse_arguments(arguments, options, problems)
-    call get_environment_variable('OMP_NUM_THREADS', length=length)
-    threads = get_threads()
-    if (options%threads == 0 .and. length > 0 .and. threads > max_threads) then
-      call problems%add('OMP_NUM_THREADS', threads, allowed_threads)
-    end if
-  end subroutine read_command_line
-
-  !> Options from the words of a command line.
-  subroutine parse_arguments(arguments, options, problems)
-    type(argument_t), intent(in) :: arguments(:)
-    type(options_t), intent(out) :: options
-    type(problems_t), intent(inout) :: problems
     character(:), allocatable :: word, value
-    integer :: i, equals
+    integer :: i, equals, length, threads
     logical :: has_value
 
     options%case_file = ''
@@ -72,10 +43,14 @@ contains
     options%restart = ''
     options%output = ''
     options%topic = ''
+    do i = 1, command_argument_count()
+      word = argument(i)
+      if (sanitise(word) /= word) call problems%add_message('control characters in '//word)
+    end do
     i = 0
-    do while (i < size(arguments))
+    do while (i < command_argument_count())
       i = i + 1
-      word = arguments(i)%text
+      word = argument(i)
       if (index(word, '-') /= 1 .or. word == '-') then
         ! A word that is not an option: the case file.
         if (len(options%case_file) > 0) then
@@ -94,18 +69,33 @@ contains
       if (has_value) then
         value = word(equals + 1:)
         word = word(:equals - 1)
-      else if ((len(needs(word)) > 0 .or. word == '--help') .and. i < size(arguments)) then
-        if (index(arguments(i + 1)%text, '--') /= 1) then
-          i = i + 1
-          value = arguments(i)%text
-          has_value = .true.
-        end if
+      else if (len(needs(word)) > 0 .or. word == '--help') then
+        value = argument(i + 1)
+        has_value = i < command_argument_count() .and. index(value, '--') /= 1
+        if (has_value) i = i + 1
+        if (.not. has_value) value = ''
       end if
       call take_option(word, has_value, value, options, problems)
     end do
     if (len(options%plan) > 0 .and. .not. options%check) call problems%add('--plan', options%plan, &
       'goes with --check')
-  end subroutine parse_arguments
+    call get_environment_variable('OMP_NUM_THREADS', length=length)
+    threads = get_threads()
+    if (options%threads == 0 .and. length > 0 .and. threads > max_threads) then
+      call problems%add('OMP_NUM_THREADS', threads, allowed_threads)
+    end if
+  contains
+    !> Word i; empty behind the last.
+    function argument(i) result(text)
+      integer, intent(in) :: i
+      character(:), allocatable :: text
+      integer :: n
+
+      call get_command_argument(i, length=n)
+      allocate (character(n) :: text)
+      call get_command_argument(i, text)
+    end function argument
+  end subroutine read_command_line
 
   !> What an option needs behind it; empty: nothing.
   pure function needs(word) result(what)

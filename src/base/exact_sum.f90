@@ -14,8 +14,7 @@ module exact_sum_m
   implicit none
   private
   public :: exact_sum, exact_sums, exact_dot, exact_dots
-  public :: accumulator_size, no_terms, exact_add, exact_add_columns, merge_accumulators, &
-    exact_totals
+  public :: accumulator_size, no_terms, exact_add, exact_add_columns, exact_totals
   public :: terms_at_once
 
   integer, parameter :: terms_at_once = 256    !! for `exact_add_columns`: they stay in the cache

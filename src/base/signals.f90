@@ -10,8 +10,7 @@ module signals_m
   use system_m, only: signal_user
   implicit none
   private
-  public :: catch_signals
-  public :: signal_interrupt, signal_terminate
+  public :: catch_signals, signal_terminate
 
   ! The numbers that Linux, macOS and the BSDs give them; they differ in SIGUSR1 alone.
   integer, parameter :: signal_hang_up = 1      !! SIGHUP

@@ -15,7 +15,7 @@ module surface_curvature_m
   use parallel_m, only: halo_exchange, global_sum
   implicit none
   private
-  public :: surface_curvature_t, surface_curvature_init, find_curvature, no_surface
+  public :: surface_curvature_t, find_curvature, no_surface
 
   !> What is known of the curvature of a cell.
   integer, parameter :: no_surface = 0, wanted = 1, from_heights = 2, from_others = 3
@@ -32,19 +32,6 @@ module surface_curvature_m
   end type surface_curvature_t
 
 contains
-
-  !> Allocate what stays from step to step; `place` and `curvature` are work arrays of the caller.
-  subroutine surface_curvature_init(grid, self)
-    type(grid_t), intent(in) :: grid
-    type(surface_curvature_t), intent(out) :: self
-    integer, parameter :: first_size = 1024
-    integer :: a(3), b(3)
-
-    a = grid%first
-    b = grid%last
-    allocate (self%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
-    allocate (self%cell(3, first_size), self%value(first_size))
-  end subroutine surface_curvature_init
 
   !> Curvature of all cells at the surface, halo filled.
   subroutine find_curvature(grid, solid, c, self)

@@ -15,7 +15,7 @@ module surface_heights_m
   use extended_fraction_m, only: nearly_pure
   implicit none
   private
-  public :: column_t, find_places, nine_heights, is_full, is_empty, no_height
+  public :: column_t, find_places, nine_heights, is_full, is_empty
 
   integer, parameter :: half_length = 3    !! cells of a column on either side of its middle
   integer, parameter :: search = 2   !! cells up or down in which a neighbour's height is looked for

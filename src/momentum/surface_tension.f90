@@ -19,8 +19,7 @@ module surface_tension_m
   use rigid_flux_m, only: rigid_flux_t
   use mixture_m, only: face_mean
   use face_weight_m, only: weight_at_faces
-  use surface_curvature_m, only: surface_curvature_t, surface_curvature_init, find_curvature, &
-                                 no_surface
+  use surface_curvature_m, only: surface_curvature_t, find_curvature, no_surface
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   implicit none
   private
@@ -42,10 +41,14 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(surface_tension_t), intent(out) :: self
+    integer, parameter :: first_size = 1024   !! of lists, which grow
 
     self%acts = .not. fluid%single_phase
     if (.not. self%acts .or. fluid%surface_tension <= 0.0_wp) return
-    call surface_curvature_init(grid, self%surface)
+    associate (a => grid%first, b => grid%last, surface => self%surface)
+      allocate (surface%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
+      allocate (surface%cell(3, first_size), surface%value(first_size))
+    end associate
   end subroutine surface_tension_init
 
   !> Curvature of the surface and its force at all faces of own cells.

@@ -9,7 +9,7 @@ module tvd_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: face_values, face_row, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
+  public :: face_values, face_row, scheme_of, tvd_scheme, mp_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell

@@ -15,7 +15,8 @@ module viscous_links_m
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall
+  use growing_m, only: ensure_capacity
+  use viscous_system_m, only: viscous_t, wall_links_t
   use merged_cells_m, only: merged_cells_t, is_unmerged
   use wall_plane_m, only: distance_of_links
   use wall_layer_m, only: along_share, rough_viscosity
@@ -189,7 +190,15 @@ contains
 
     spacing = cube_root(grid%volume)
     self%walls%n = 2*solid%n_link
-    call bytes_for_walls(self%walls%n, self%walls)
+    associate (n => self%walls%n, walls => self%walls)
+      call ensure_capacity(n, walls%found_cell)
+      call ensure_capacity(n, walls%found_body)
+      call ensure_capacity(n, walls%found_k)
+      call ensure_capacity(n, walls%found_arm)
+      call ensure_capacity(n, walls%cell)
+      call ensure_capacity(n, walls%k)
+      call ensure_capacity(n, walls%arm)
+    end associate
     !$omp parallel do private(f) schedule(static)
     do m = 1, solid%n_link
       self%walls%found_body(2*m - 1:2*m) = 0
@@ -218,8 +227,10 @@ contains
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
       viscosity = mu(c(1), c(2), c(3))
       if (present(merged)) viscosity = max(viscosity, viscosity_at_wall(n, c))
-      call set_wall(n, c, body, viscosity*grid%area(d)/(grid%h(d)*t), &
-                    nearest_arm(grid, x_wall, bodies%x(:, body)), self%walls)
+      self%walls%found_cell(:, n) = c
+      self%walls%found_body(n) = body
+      self%walls%found_k(n) = viscosity*grid%area(d)/(grid%h(d)*t)
+      self%walls%found_arm(:, n) = nearest_arm(grid, x_wall, bodies%x(:, body))
     end subroutine wall_link
 
     !> That of a rough layer, for link n of cell c [Pa s]. A fluid without viscosity slips.

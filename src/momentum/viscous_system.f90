@@ -3,12 +3,11 @@
 !! `viscous_links_m` fills it, `viscous_m` and `momentum_c_ismac_m` solve it.
 module viscous_system_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   use scratch_m, only: scratch_t, take, give
   implicit none
   private
-  public :: viscous_t, wall_links_t, viscous_init, add_wall, bytes_for_walls, set_wall
+  public :: viscous_t, wall_links_t, viscous_init
   public :: take_arrays, give_arrays
 
   !> Links between cells and bodies, grouped by body.
@@ -111,44 +110,5 @@ contains
     call give(scratch, self%s)
     call give(scratch, self%y)
   end subroutine give_arrays
-
-  !> Note a wall link of conductance k between a cell and a body.
-  subroutine add_wall(self, c, body, k, arm)
-    type(viscous_t), intent(inout) :: self
-    integer, intent(in) :: c(3), body
-    real(wp), intent(in) :: k        !! [kg/s]
-    real(wp), intent(in) :: arm(3)   !! [m]
-
-    self%walls%n = self%walls%n + 1
-    call bytes_for_walls(self%walls%n, self%walls)
-    call set_wall(self%walls%n, c, body, k, arm, self%walls)
-  end subroutine add_wall
-
-  !> Room for n wall links.
-  subroutine bytes_for_walls(n, walls)
-    integer, intent(in) :: n
-    type(wall_links_t), intent(inout) :: walls
-
-    call ensure_capacity(n, walls%found_cell)
-    call ensure_capacity(n, walls%found_body)
-    call ensure_capacity(n, walls%found_k)
-    call ensure_capacity(n, walls%found_arm)
-    call ensure_capacity(n, walls%cell)
-    call ensure_capacity(n, walls%k)
-    call ensure_capacity(n, walls%arm)
-  end subroutine bytes_for_walls
-
-  !> What was found as number n.
-  pure subroutine set_wall(n, c, body, k, arm, walls)
-    integer, intent(in) :: n, c(3), body
-    real(wp), intent(in) :: k        !! [kg/s]
-    real(wp), intent(in) :: arm(3)   !! [m]
-    type(wall_links_t), intent(inout) :: walls
-
-    walls%found_cell(:, n) = c
-    walls%found_body(n) = body
-    walls%found_k(n) = k
-    walls%found_arm(:, n) = arm
-  end subroutine set_wall
 
 end module viscous_system_m

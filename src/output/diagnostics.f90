@@ -4,7 +4,7 @@ module diagnostics_m
   use kinds_m, only: wp, i8
   use vectors_m, only: norm
   use parallel_m, only: global_max
-  use exact_sum_m, only: accumulator_size, no_terms, exact_add, merge_accumulators, exact_totals
+  use exact_sum_m, only: accumulator_size, no_terms, exact_add, exact_add_columns, exact_totals
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
@@ -126,34 +126,21 @@ contains
     type(flow_t), intent(in) :: flow
     type(solid_geometry_t), intent(in) :: solid
     type(fluid_sums_t) :: sums
-    integer, parameter :: n = 3
-    integer(i8) :: accumulator(accumulator_size, n), mine(accumulator_size, n)
+    integer(i8) :: accumulator(accumulator_size, 3)
     real(wp), allocatable :: terms(:, :)   ! of one plane
-    real(wp) :: total(n), excess(1)
-    integer :: k, m
+    real(wp) :: total(3), excess(1)
+    integer :: k
 
-    do m = 1, n
-      accumulator(:, m) = no_terms
-    end do
+    accumulator = spread(no_terms, 2, 3)
     excess = 0.0_wp
-    !$omp parallel private(mine, terms, k, m) reduction(max: excess)
-    allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), n))
-    do m = 1, n
-      mine(:, m) = no_terms
-    end do
+    !$omp parallel private(terms, k) reduction(max: excess)
+    allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), 3))
     !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
       call plane_terms(fluid, grid, k, flow, solid%alpha, terms, excess(1))
-      do m = 1, n
-        call exact_add(terms(:, m), mine(:, m))
-      end do
+      call exact_add_columns(terms, accumulator)
     end do
     !$omp end do nowait
-    !$omp critical (merge_fluid_sums)
-    do m = 1, n
-      call merge_accumulators(mine(:, m), accumulator(:, m))
-    end do
-    !$omp end critical (merge_fluid_sums)
     !$omp end parallel
     call exact_totals(accumulator, total)
     call global_max(excess)

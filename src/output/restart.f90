@@ -61,7 +61,7 @@ contains
       if (shapes(i)%kind /= 'file') cycle
       call sum%add_reals(size(shapes(i)%point), shapes(i)%point)
       call sum%add_integers(size(shapes(i)%tet), shapes(i)%tet)
-      call add_line('the shape '//trim(shapes(i)%name))
+      call add_line('the shape '//trim(shapes(i)%name), [real(wp) ::])
     end do
     do i = 1, size(case%drop)
       if (.not. allocated(case%drop(i)%row)) cycle
@@ -72,36 +72,30 @@ contains
           call sum%add_integers(1, [merge(1, 0, row%fixed)])
         end associate
       end do
-      call add_line('the places of &drop '//to_text(i))
+      call add_line('the places of &drop '//to_text(i), [real(wp) ::])
     end do
     do i = 1, size(case%body)
       associate (path => case%body(i)%path)
-        if (path%n == 0) cycle
-        call sum%add_reals(path%n, path%time)
-        call sum%add_reals(size(path%x), path%x)
-        call sum%add_reals(size(path%q), path%q)
-        call add_line('the motion of body '//to_text(i))
+        if (path%n > 0) call add_line('the motion of body '//to_text(i), [path%time, path%x, &
+          path%q])
       end associate
     end do
     associate (begun => case%begun)   ! where blocks begin that another run left
       if (begun%n > 0) then
-        call sum%add_integers(begun%n, begun%drop)
-        call sum%add_integers(begun%n, begun%block)
-        call sum%add_reals(size(begun%x), begun%x)
-        call sum%add_reals(size(begun%q), begun%q)
-        call sum%add_reals(size(begun%v), begun%v)
-        call sum%add_reals(size(begun%omega), begun%omega)
-        call add_line('the start')
+        call sum%add_integers(2*begun%n, [begun%drop, begun%block])
+        call add_line('the start', [begun%x, begun%q, begun%v, begun%omega])
       end if
     end associate
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
 
   contains
 
-    !> End the line of a file, and begin the checksum of the next.
-    subroutine add_line(what)
+    !> End the line of a file with its last numbers, and begin the checksum of the next.
+    subroutine add_line(what, numbers)
       character(*), intent(in) :: what
+      real(wp), intent(in) :: numbers(:)
 
+      call sum%add_reals(size(numbers), numbers)
       text = text//'! checksum of '//what//' '//sum%text()//new_line('a')
       sum = checksum_t()
     end subroutine add_line

@@ -5,7 +5,8 @@ module test_exact_sum_m
     ieee_set_flag, ieee_invalid
   use check_m, only: check, wp, i8
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_dots, exact_add, exact_totals, &
-    exact_add_columns, merge_accumulators, no_terms, accumulator_size
+    exact_add_columns, no_terms, accumulator_size
+  use exact_accumulator_m, only: merge_accumulators
   use parallel_m, only: set_threads
   implicit none
   private
