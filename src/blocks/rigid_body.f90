@@ -19,7 +19,7 @@ module rigid_body_m
   public :: begin_step, drift, drift_body, angular_velocity, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
-  public :: follow_motions, look_ahead, change_by_motion, haste
+  public :: follow_motions, look_ahead, change_by_motion, haste, are_driven
 
   !> Status of a block: not there yet (its time may have come), held and lowered, released, left
   !! out for good because its place was taken, or out of the tank through an open side.
@@ -421,5 +421,14 @@ contains
             + max(norm(blocks%omega(:, b)), blocks%ahead(2, b)) &
             *blocks%shapes(blocks%shape(b))%radius
   end function fastest_point
+
+  !> Which blocks have given rates or a table; held and lowered ones move by them.
+  pure function are_driven(blocks) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes(blocks%n)
+
+    yes = blocks%path%n > 0 .or. any(abs(blocks%given%v) > 0.0_wp, 1) &
+      .or. any(abs(blocks%given%omega) > 0.0_wp, 1)
+  end function are_driven
 
 end module rigid_body_m

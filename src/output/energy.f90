@@ -15,7 +15,7 @@ module energy_m
   use case_types_m, only: case_t
   use boundary_kinds_m, only: is_wall, gives_velocity
   use grid_m, only: grid_t
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, are_driven
   implicit none
   private
   public :: energy_t, energy_parts_t, energy_init, put_in_energy, store_energy, energy_excess
@@ -62,11 +62,9 @@ contains
                      .and. (is_wall(grid%side(s, d)) .or. .not. gives_velocity(grid%side(s, d)))
       end do
     end do
-    do b = 1, blocks%n
-      if (.not. (blocks%fixed(b) .or. blocks%handling(b)%lowering_speed > 0.0_wp)) cycle
-      self%known = self%known .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
-                   .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp) .and. blocks%path(b)%n == 0
-    end do
+    associate (told => blocks%fixed .or. blocks%handling%lowering_speed > 0.0_wp)
+      self%known = self%known .and. .not. any(told .and. are_driven(blocks))
+    end associate
     if (.not. self%known) return
     g = norm(case%fluid%gravity)
     d = maxloc(abs(case%fluid%gravity), 1)

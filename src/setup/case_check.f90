@@ -14,6 +14,7 @@ module case_check_m
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
   use case_blocks_m, only: height_at_level
+  use rest_depth_m, only: n_free
   use start_bodies_m, only: with_begun
   use given_motion_m, only: pose_at, fastest_between
   use bed_m, only: bed_t
@@ -367,7 +368,7 @@ contains
     character(:), allocatable :: cure
     real(wp) :: edge, width(size(shapes))    ! largest of a cell, of the shapes [m]
     real(wp) :: box(3)                       ! edges [m]
-    integer :: s, i
+    integer :: s
 
     if (case%run%physics /= 'coupled') return
     if (case%grid%extent_faulty .or. case%grid%cells_faulty) return
@@ -384,9 +385,7 @@ contains
       if (shapes(s)%family /= '') then
         if (s /= minloc(width, 1, shapes%family == shapes(s)%family)) cycle
       end if
-      if (.not. any(is_called(shapes(s), case%body%shape) .and. .not. case%body%fixed) &
-          .and. all([(count_of_shape(case%drop(i), shapes(s), with_fixed=.false.), &
-                      i=1, size(case%drop))] == 0)) cycle   ! it is not, or does not move freely
+      if (n_free(case, shapes(s)) == 0) cycle
       cure = 'block at least '//brief(min_cells_wide*edge, 3)//' m wide'
       if (shapes(s)%family /= '') cure = 'mass_min of '//brief(shapes(s)%density &
         *shapes(s)%volume*(min_cells_wide*edge/width(s))**3, 3)//' kg'

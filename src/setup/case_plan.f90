@@ -49,15 +49,26 @@ contains
     type(bed_t), intent(in) :: bed
     type(blocks_t) :: blocks   ! all there will be
     logical :: wet, with_blocks
-    integer :: n_points(size(shapes))
-    real(wp) :: d_s
+    type(surface_t) :: surface
+    integer :: n_points(size(shapes))   ! of the surface, or contact spheres
+    real(wp) :: d_s   ! smallest length of the contact Courant number, eq. (6), of all shapes [m]
+    integer :: s
 
     wet = has_flow(case%run)
     with_blocks = case%run%physics /= 'fluid'
     call blocks_init(case, shapes, blocks)
-    call count_contact_features(case, shapes, n_points, d_s)
-    call print_run(case)
-    call print_grid(case, wet)
+    d_s = huge(d_s)
+    do s = 1, size(shapes)
+      if (case%contact%model == 'surface') then
+        call surface_init(shapes(s), surface)
+        n_points(s) = size(surface%vertex, 2)
+        d_s = min(d_s, surface%length)
+      else
+        n_points(s) = size(shapes(s)%sphere_radius)
+        d_s = min(d_s, 2*minval(shapes(s)%sphere_radius))
+      end if
+    end do
+    call print_run(case, wet)
     if (bed%there) call entry('bed from', file_text(trim(case%bed%file))//', ' &
       //to_text(bed%n_given)//' facets, heights from '//place_text(minval(bed%point(3, :)), &
       case%grid%length)//' to '//place_text(maxval(bed%point(3, :)), case%grid%length)//' m')
@@ -69,8 +80,13 @@ contains
     call print_files(case, wet)
   end subroutine print_plan
 
-  subroutine print_run(case)
+  !> The run, and the tank with its cells.
+  subroutine print_run(case, wet)
     type(case_t), intent(in) :: case
+    logical, intent(in) :: wet
+    character(*), parameter :: axis = 'xyz'
+    character(:), allocatable :: corner
+    integer :: d
 
     call heading('Run')
     if (len_trim(case%run%title) > 0) call entry('title', case%run%title)
@@ -81,39 +97,26 @@ contains
     case default; call entry('physics', 'dry: blocks alone')
     end select
     call entry('simulated time', brief(case%run%t_end)//' s')
-    if (case%run%stop_when_settled) then
-      call entry('ends early', 'when every block is slower than '//brief(case%run%rest_speed) &
-        //' m/s for '//brief(case%run%rest_time)//' s')
-    end if
-  end subroutine print_run
-
-  subroutine print_grid(case, wet)
-    type(case_t), intent(in) :: case
-    logical, intent(in) :: wet
-    character(1), parameter :: axis(3) = ['x', 'y', 'z']
-    integer :: d
-
+    if (case%run%stop_when_settled) call entry('ends early', 'when every block is slower than ' &
+      //brief(case%run%rest_speed)//' m/s for '//brief(case%run%rest_time)//' s')
     call heading('Tank')
     call entry('length', triple(case%grid%length)//' m')
-    call entry('lower corner', place(1)//', '//place(2)//', '//place(3)//' m')
+    corner = ''
     do d = 1, 3
-      call entry('sides in '//axis(d), trim(case%boundary%kind(1, d))//' and ' &
-                 //trim(case%boundary%kind(2, d)))
+      corner = corner//', '//place_text(case%grid%origin(d), case%grid%length)
+    end do
+    call entry('lower corner', corner(3:)//' m')
+    do d = 1, 3
+      call entry('sides in '//axis(d:d), trim(case%boundary%kind(1, d))//' and ' &
+        //trim(case%boundary%kind(2, d)))
     end do
     if (.not. wet) return
     associate (n => case%grid%cells)
       call entry('cells', to_text(n(1))//' x '//to_text(n(2))//' x '//to_text(n(3))//' = ' &
-                 //to_text(product(n)))
+        //to_text(product(n)))
     end associate
     call entry('spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
-  contains
-    function place(d) result(text)
-      integer, intent(in) :: d
-      character(:), allocatable :: text
-
-      text = place_text(case%grid%origin(d), case%grid%length)
-    end function place
-  end subroutine print_grid
+  end subroutine print_run
 
   subroutine print_liquid(case, bed)
     type(case_t), intent(in) :: case
@@ -341,15 +344,29 @@ contains
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
     character(:), allocatable :: text
-    real(wp) :: seconds
+    real(wp) :: seconds, awake, g
+    integer :: b, n
 
     if (wet) then
       seconds = seconds_per_block*real(blocks%n, wp) &
         + seconds_per_cell*product(real(case%grid%cells, wp))
       seconds = seconds*case%run%t_end/case%run%dt
-    else
-      seconds = seconds_per_substep*block_seconds(case, blocks) &
-        *substeps_per_contact/case%contact%contact_time
+    else   ! times for which the blocks are awake, all together
+      g = norm(case%fluid%gravity)
+      n = size(case%body)
+      seconds = 0.0_wp
+      do b = 1, blocks%n
+        if (b <= n .and. blocks%fixed(b)) cycle
+        awake = max(case%run%t_end - blocks%release_time(b), 0.0_wp)
+        if (case%contact%sleep .and. g > 0.0_wp) awake = min(awake, &
+          time_awake*sqrt(cube_root(blocks%shapes(blocks%shape(b))%volume)/g))
+        seconds = seconds + awake
+      end do
+      associate (time => min(blocks%release_time(n + 1:), case%run%t_end))   ! of the drops
+        if (case%contact%sleep .and. size(time) > 0) seconds = seconds &
+          + share_shaken*sum(maxval(time) - time)
+      end associate
+      seconds = seconds_per_substep*seconds*substeps_per_contact/case%contact%contact_time
     end if
     if (seconds < 100.0_wp) then
       text = brief(seconds, 2)//' s'
@@ -359,30 +376,6 @@ contains
       text = brief(seconds/3600.0_wp, 2)//' hours'
     end if
   end function time_text
-
-  !> Times for which the blocks are awake, all together [s].
-  pure function block_seconds(case, blocks) result(seconds)
-    type(case_t), intent(in) :: case
-    type(blocks_t), intent(in) :: blocks
-    real(wp) :: seconds
-    real(wp) :: awake, g
-    integer :: b, n
-
-    g = norm(case%fluid%gravity)
-    n = size(case%body)
-    seconds = 0.0_wp
-    do b = 1, blocks%n
-      if (b <= n .and. blocks%fixed(b)) cycle
-      awake = max(case%run%t_end - blocks%release_time(b), 0.0_wp)
-      if (case%contact%sleep .and. g > 0.0_wp) awake = min(awake, &
-        time_awake*sqrt(cube_root(blocks%shapes(blocks%shape(b))%volume)/g))
-      seconds = seconds + awake
-    end do
-    if (.not. case%contact%sleep) return
-    associate (time => min(blocks%release_time(n + 1:), case%run%t_end))   ! of the drops
-      if (size(time) > 0) seconds = seconds + share_shaken*sum(maxval(time) - time)
-    end associate
-  end function block_seconds
 
   !> Limits of the body steps, and how far the lightest shape gives way.
   subroutine print_body_steps(case, shapes, d_s)
@@ -483,29 +476,6 @@ contains
       if (times - aint(times) > 1.0e-9_wp) written = written + 1.0_wp
     end function written
   end subroutine print_files
-
-  !> What of each shape touches, points of the surface or contact spheres, and the smallest length
-  !! d_s of the contact Courant number, eq. (6), of all shapes.
-  subroutine count_contact_features(case, shapes, n_points, d_s)
-    type(case_t), intent(in) :: case
-    type(shape_t), intent(in) :: shapes(:)
-    integer, intent(out) :: n_points(:)   !! how many [-]
-    real(wp), intent(out) :: d_s          !! [m]
-    type(surface_t) :: surface
-    integer :: s
-
-    d_s = huge(d_s)
-    do s = 1, size(shapes)
-      if (case%contact%model == 'surface') then
-        call surface_init(shapes(s), surface)
-        n_points(s) = size(surface%vertex, 2)
-        d_s = min(d_s, surface%length)
-      else
-        n_points(s) = size(shapes(s)%sphere_radius)
-        d_s = min(d_s, 2*minval(shapes(s)%sphere_radius))
-      end if
-    end do
-  end subroutine count_contact_features
 
   subroutine heading(text)
     character(*), intent(in) :: text

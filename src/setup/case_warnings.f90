@@ -2,8 +2,7 @@
 module case_warnings_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, place_t, is_given, &
-    smallest_spacing, has_flow
+  use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use case_blocks_m, only: turning_share
   use bed_m, only: bed_t
@@ -45,9 +44,7 @@ contains
     if (case%fluid%gravity(3) > 0.0_wp) call warnings%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
     if (case%run%physics /= 'dry') call look_at_water(case, warnings)
-    if (has_flow(case%run)) then
-      call look_at_sides(case, warnings)
-    end if
+    if (has_flow(case%run)) call look_at_sides(case, warnings)
     planned = planned_memory(case, shapes, bed)
     available = available_memory()
     if (available > 0 .and. planned > available) call warnings%add_message('&grid cells = ' &

@@ -49,8 +49,9 @@ contains
       'the file holds neither ''liquid'' nor ''velocity''')
     if (liquid) then
       call check_values(liquid_name, case%grid%cells, 0.0_wp, 1.0_wp, 'shares between 0 and 1')
-      if ((is_given(case%fluid%water_level) .and. .not. streams(case)) .or. size(case%water) > 0 &
-          .or. case%fluid%single_phase) then
+      if ((is_given(case%fluid%water_level) .and. .not. any(case%boundary%kind == 'inflow' &
+        .or. case%boundary%kind == 'outflow')) .or. size(case%water) > 0 &   ! these keep the level
+        .or. case%fluid%single_phase) then
         call report('''liquid'' of the file takes the place of water_level, single_phase and '// &
                   '&water, give one only')
       end if
@@ -112,13 +113,6 @@ contains
       if (file%info /= 0) call report(file%message)
     end subroutine check_values
   end subroutine check_initial_state
-
-  !> Has the case a side that goes by the water level?
-  pure logical function streams(case)
-    type(case_t), intent(in) :: case
-
-    streams = any(case%boundary%kind == 'inflow' .or. case%boundary%kind == 'outflow')
-  end function streams
 
   !> Does the case name a file?
   pure logical function is_named(fluid)

@@ -11,7 +11,7 @@ module rest_depth_m
   use law_restitution_m, only: min_restitution
   implicit none
   private
-  public :: look_at_rest, heaviest_mass
+  public :: look_at_rest, heaviest_mass, n_free
 
 contains
 

@@ -11,7 +11,7 @@ module scene_m
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, are_driven
   use case_blocks_m, only: blocks_init
   use drops_m, only: place_of_block, shape_of_place
   use walls_m, only: walls_t, walls_init
@@ -48,6 +48,7 @@ contains
     type(case_t) :: good          ! the good bodies and one more, no drops
     type(shape_t), allocatable :: made(:)
     logical :: use_it(size(case%body))
+    logical, allocatable :: driven(:)
     integer :: n
 
     if (.not. any(shapes%volume > 0.0_wp)) return
@@ -72,15 +73,9 @@ contains
     if (.not. case%grid%extent_faulty) call walls_init(case%grid, case%boundary, scene%walls)
     scene%walls%bed => bed
     scene%no_walls%period = scene%walls%period
-    allocate (scene%held(scene%n), scene%outside(scene%n))
-    scene%outside = .false.
-    associate (blocks => scene%blocks)
-      do n = 1, scene%n
-        scene%held(n) = blocks%fixed(n) .and. scene%dated(n) &
-          .and. all(abs(blocks%given%v(:, n)) <= 0.0_wp) &
-          .and. all(abs(blocks%given%omega(:, n)) <= 0.0_wp) .and. blocks%path(n)%n == 0
-      end do
-    end associate
+    allocate (scene%outside(scene%n), source=.false.)
+    driven = are_driven(scene%blocks)
+    scene%held = scene%blocks%fixed(:scene%n) .and. scene%dated .and. .not. driven(:scene%n)
   end subroutine set_scene
 
   !> The fixed blocks of tables, whose height is known, stand there like bodies of the case.

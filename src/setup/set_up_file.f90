@@ -12,7 +12,7 @@ module set_up_file_m
   use bed_m, only: bed_t
   use grid_m, only: grid_init
   use drops_m, only: place_of_block
-  use rigid_body_m, only: blocks_t, drift
+  use rigid_body_m, only: blocks_t, drift, are_driven
   use case_blocks_m, only: blocks_init
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
@@ -38,7 +38,7 @@ contains
     type(run_state_t) :: state
     type(step_report_t) :: report
     type(run_file_t) :: file
-    integer :: i, n
+    integer :: i
 
     call grid_init(case%grid, case%boundary, state%grid)
     call clock_init(case%run, state%clock)
@@ -48,10 +48,8 @@ contains
     file%row = make_row(case%fluid, 0.0_wp, state, report)
     call create_run_file(path, state, bed, file)
     call write_places(case, state%blocks, file)
-    n = 0
-    if (any(moves(state%blocks))) n = n_poses
-    state%blocks%present = moves(state%blocks)   ! nothing else is moved below
-    do i = 0, n
+    state%blocks%present = state%blocks%fixed .and. are_driven(state%blocks)   ! only they move
+    do i = 0, merge(n_poses, 0, any(state%blocks%present))
       file%row = make_row(case%fluid, 0.0_wp, state, report)
       call file%append(i, state)
       call drift(case%run%t_end/n_poses, state%blocks)
@@ -61,15 +59,6 @@ contains
     message = ''
     if (file%file%info /= 0) message = file%file%message
   end subroutine write_set_up
-
-  !> Fixed bodies with a prescribed velocity, or on a path.
-  pure function moves(blocks) result(yes)
-    type(blocks_t), intent(in) :: blocks
-    logical :: yes(blocks%n)
-
-    yes = blocks%fixed .and. (blocks%path%n > 0 .or. any(abs(blocks%given%v) > 0.0_wp, 1) &
-      .or. any(abs(blocks%given%omega) > 0.0_wp, 1))
-  end function moves
 
   !> Of each body its line in the case, its place without and with the range of the random shift.
   subroutine write_places(case, blocks, run)
