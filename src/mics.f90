@@ -49,7 +49,7 @@ program mics
   type(fault_t) :: fault
   type(stop_requests_t) :: stop_requests
   character(:), allocatable :: parameters, message, program_name
-  integer :: code, signal = 0, length
+  integer :: code, waiting, signal = 0, length
   real(wp) :: began   !! wall clock at the start [s]
 
   call parallel_init()
@@ -67,11 +67,10 @@ program mics
     call resume(sim)
   end if
   call open_output(case, parameters, options, sim%run_state_t, bed, output)
-  call stop_on_error()
+  if (output%code /= exit_ok) call fatal(output%code, output%message)   ! what was written stays
   call measure(sim, report)
-  if (len(options%restart) == 0) then   ! else what was due has been written
-    call write_due_output(sim%run_state_t, report, output)
-  end if
+  ! of a run that goes on, what was due has been written
+  if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
   stop_requests = stop_requests_t('', output%lock, options%max_wall, began, last=wall_clock())
   call store_places(sim, fault)
   do while (.not. sim%clock%finished())
@@ -82,18 +81,18 @@ program mics
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)
   end do
-  if (sim%clock%finished() .and. n_pending(sim%clock%t, sim%blocks) > 0) then
+  waiting = n_pending(sim%clock%t, sim%blocks)
+  if (sim%clock%finished() .and. waiting > 0) then
     message = ''
     if (sim%clock%settled()) message = ', and all others are at rest'
-    call set_fault(sim, to_text(n_pending(sim%clock%t, sim%blocks)) &
-      //' due block(s) never found room'//message, fault)
+    call set_fault(sim, to_text(waiting)//' due block(s) never found room'//message, fault)
   end if
 
   code = fault%code
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
   call measure_overlap(sim, report)   ! of the last row
   call close_output(code, sim%run_state_t, report, output)
-  call stop_on_error()
+  if (output%code /= exit_ok) call fatal(output%code, output%message)   ! what was written stays
   if (fault%code /= exit_ok) call fatal(code, fault%message)
   if (code /= exit_ok) then
     call get_command_argument(0, length=length)
@@ -116,13 +115,10 @@ contains
     call read_command_line(options, problems)
     if (options%help) reference = reference_text(options%topic, problems)
     if (problems%n > 0) call refuse(problems)
+    if (options%version) reference = reference//'mics '//version//' '//git_revision//new_line('a')
     if (options%help .or. options%version) then
-      if (is_root() .and. options%help) then
-        if (len(options%topic) == 0) call print_help(output_unit)
-        write (output_unit, '(a)', advance='no') reference
-      end if
-      if (is_root() .and. options%version) write (output_unit, '(4a)') 'mics ', version, ' ', &
-        git_revision
+      if (is_root() .and. options%help .and. len(options%topic) == 0) call print_help(output_unit)
+      if (is_root()) write (output_unit, '(a)', advance='no') reference
       call finish()
     end if
     call set_threads(options%threads)
@@ -193,10 +189,5 @@ contains
     call parallel_final()
     stop
   end subroutine finish
-
-  !> An error of files ends the run; what was written stays.
-  subroutine stop_on_error()
-    if (output%code /= exit_ok) call fatal(output%code, output%message)
-  end subroutine stop_on_error
 
 end program mics

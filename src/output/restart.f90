@@ -33,8 +33,7 @@ module restart_m
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use state_m, only: list_state, state_groups
-  use state_list_m, only: state_list_t, item_t, item_cells, item_reals, item_integers, &
-    item_logicals
+  use state_list_m, only: state_list_t, item_t
   use file_space_m, only: bytes_for_change
   implicit none
   private
@@ -128,19 +127,18 @@ contains
     end do
     do i = 1, list%n
       associate (item => list%item(i))
-        select case (item%kind)
-        case (item_cells)   ! each process its part
+        if (associated(item%cells)) then   ! each process its part
           call file%new_blocks(item%name, item%units, item%extent)
           do d = 1, item%extent(4)
             call item%part(list%grid, d, first, last)
             call file%write_block(item%name, [first, d], [last - first + 1, 1], &
               [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
           end do
-        case (item_reals)
+        else if (associated(item%reals)) then
           call file%store(item%name, item%units, item%reals, item%extent)
-        case default
+        else
           call file%store(item%name, '1', item%numbers(), item%extent)
-        end select
+        end if
       end associate
     end do
     call file%attribute('/', 'checksum', list%checksum())
@@ -350,9 +348,8 @@ contains
     logical :: well
 
     well = file%info == 0
-    if (.not. well .and. item%kind /= item_cells) return   ! other processes wait for the halos
-    select case (item%kind)
-    case (item_cells)
+    if (.not. (well .or. associated(item%cells))) return   ! else other processes wait for the halos
+    if (associated(item%cells)) then
       do d = 1, item%extent(4)
         call item%part(grid, d, first, last)
         allocate (row(product(last - first + 1)), source=0.0_wp)
@@ -362,14 +359,14 @@ contains
         deallocate (row)
         call halo_exchange(item%cells(:, :, :, d), n_halo)
       end do
-    case (item_reals)
+    else if (associated(item%reals)) then
       call file%read(item%name, item%reals)
-    case default
+    else
       numbers = item%numbers()
       call file%read(item%name, numbers)
-      if (item%kind == item_integers) item%integers = numbers
-      if (item%kind == item_logicals) item%logicals = numbers == 1
-    end select
+      if (associated(item%integers)) item%integers = numbers
+      if (associated(item%logicals)) item%logicals = numbers == 1
+    end if
     if (well .and. file%info /= 0 .and. len(item%units) > 0) file%message = file%message//' [' &
       //item%units//']'
   end subroutine read_item

@@ -8,16 +8,14 @@ module state_list_m
   implicit none
   private
   public :: item_t, state_list_t, checksum_of_cells
-  public :: item_cells, item_reals, item_integers, item_logicals
 
-  integer, parameter :: item_cells = 1, item_reals = 2, item_integers = 3, item_logicals = 4
   integer, parameter :: max_items = 100
 
-  !> An array of the state. Cells are those of this process, with halo; all else is the same on all
-  !! processes. The pointers hold as long as the arrays keep their place.
+  !> An array of the state: one of the pointers is associated. Cells are those of this process, with
+  !! halo; all else is the same on all processes. The pointers hold as long as the arrays keep their
+  !! place.
   type :: item_t
     character(:), allocatable :: name, units   !! name with its group
-    integer :: kind = 0                        !! `item_cells`, ...: which pointer is set
     logical :: on_faces = .false.              !! component d lives on lower faces of direction d
     integer, allocatable :: extent(:)          !! of the whole array
     real(wp), pointer, contiguous :: cells(:, :, :, :) => null()   !! (i, j, k, component)
@@ -50,7 +48,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: a(:, :, :)   !! with halo
 
-    call self%begin(name, units, item_cells, [self%grid%n, 1])
+    call self%begin(name, units, [self%grid%n, 1])
     associate (item => self%item(self%n), first => self%grid%first, last => self%grid%last)
       item%cells(first(1):last(1), first(2):last(2), first(3):last(3), 1:1) => a
     end associate
@@ -63,7 +61,7 @@ contains
     real(wp), intent(in), target, contiguous :: a(:, :, :, :)   !! with halo
     logical, intent(in) :: on_faces
 
-    call self%begin(name, units, item_cells, [self%grid%n + merge(1, 0, on_faces), size(a, 4)])
+    call self%begin(name, units, [self%grid%n + merge(1, 0, on_faces), size(a, 4)])
     associate (item => self%item(self%n), first => self%grid%first)
       item%on_faces = on_faces
       item%cells(first(1):, first(2):, first(3):, 1:) => a
@@ -75,7 +73,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target :: x
 
-    call self%begin(name, units, item_reals, [1])
+    call self%begin(name, units, [1])
     call c_f_pointer(c_loc(x), self%item(self%n)%reals, [1])
   end subroutine add_number
 
@@ -84,7 +82,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: a(:)
 
-    call self%begin(name, units, item_reals, shape(a))
+    call self%begin(name, units, shape(a))
     self%item(self%n)%reals => a
   end subroutine add_reals
 
@@ -93,7 +91,7 @@ contains
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: a(:, :)
 
-    call self%begin(name, units, item_reals, shape(a))
+    call self%begin(name, units, shape(a))
     self%item(self%n)%reals(1:size(a)) => a
   end subroutine add_matrix
 
@@ -102,7 +100,7 @@ contains
     character(*), intent(in) :: name
     integer, intent(in), target :: i
 
-    call self%begin(name, '', item_integers, [1])
+    call self%begin(name, '', [1])
     call c_f_pointer(c_loc(i), self%item(self%n)%integers, [1])
   end subroutine add_whole_number
 
@@ -111,7 +109,7 @@ contains
     character(*), intent(in) :: name
     integer, intent(in), target, contiguous :: a(:)
 
-    call self%begin(name, '', item_integers, shape(a))
+    call self%begin(name, '', shape(a))
     self%item(self%n)%integers => a
   end subroutine add_integers
 
@@ -121,15 +119,15 @@ contains
     character(*), intent(in) :: name
     logical, intent(in), target, contiguous :: a(:)
 
-    call self%begin(name, '', item_logicals, shape(a))
+    call self%begin(name, '', shape(a))
     self%item(self%n)%logicals => a
   end subroutine add_logicals
 
   !> One more item, whose pointer is to be set.
-  subroutine begin(self, name, units, kind, extent)
+  subroutine begin(self, name, units, extent)
     class(state_list_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in) :: kind, extent(:)
+    integer, intent(in) :: extent(:)
 
     if (.not. allocated(self%item)) allocate (self%item(max_items))
     if (self%n == max_items) error stop 'state_list: max_items is too small'
@@ -137,7 +135,6 @@ contains
     associate (item => self%item(self%n))
       item%name = name
       item%units = units
-      item%kind = kind
       item%extent = extent
     end associate
   end subroutine begin
@@ -160,8 +157,8 @@ contains
     class(item_t), intent(in) :: self
     integer :: a(product(self%extent))
 
-    if (self%kind == item_integers) a = self%integers
-    if (self%kind == item_logicals) a = merge(1, 0, self%logicals)
+    if (associated(self%integers)) a = self%integers
+    if (associated(self%logicals)) a = merge(1, 0, self%logicals)
   end function numbers
 
   !> Checksum of the whole state, the same on any number of processes.
@@ -184,14 +181,13 @@ contains
     type(checksum_t), intent(inout) :: sum
 
     call sum%add_text(self%name//self%units)
-    select case (self%kind)
-    case (item_cells)
+    if (associated(self%cells)) then
       call sum%add_integers(4, transfer(checksum_of_cells(self, grid), [0]))
-    case (item_reals)
+    else if (associated(self%reals)) then
       call sum%add_reals(size(self%reals), self%reals)
-    case default
+    else
       call sum%add_integers(product(self%extent), self%numbers())
-    end select
+    end if
   end subroutine add_to_checksum
 
   !> Two sums over all processes of scrambled bits, each element with its own place in it, so that
@@ -242,7 +238,7 @@ contains
     do i = 1, self%n
       associate (item => self%item(i))
         n = n + header + len(item%name//item%units) + product(int(item%extent, i8)) &
-          *merge(8, 4, item%kind == item_cells .or. item%kind == item_reals)
+          *merge(8, 4, associated(item%cells) .or. associated(item%reals))
       end associate
     end do
   end function bytes
