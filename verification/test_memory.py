@@ -120,7 +120,7 @@ HEIGHTS: dict[str, Callable[[int, int], float]] = {
 @pytest.mark.parametrize("form", HEIGHTS)
 @pytest.mark.parametrize("physics", ["dry", "fluid"])
 def test_a_bed_is_in_the_plan(form: str, physics: str, tmp_path: Path) -> None:
-    """Within a fifth of what a run takes, and 1.4 kB for a height at most."""
+    """Within a fifth of what a run takes, and 330 B for a height at most."""
     n = 400
     rows = (" ".join(f"{HEIGHTS[form](i, j):.4f}" for i in range(n)) for j in range(n))
     (tmp_path / "bed.txt").write_text(f"{n} {n} 0 0 0.25 0.25\n" + "\n".join(rows))
@@ -132,7 +132,7 @@ def test_a_bed_is_in_the_plan(form: str, physics: str, tmp_path: Path) -> None:
     plan, _ = planned(run_text(tmp_path, case, "--check").stdout)
     _, _, taken = timed([MICS, "--quiet", "case.nml"], tmp_path)
     assert 0.8 < plan / taken < 1.2, (plan, taken)
-    assert physics != "dry" or taken < 30e6 + 1400 * n**2
+    assert physics != "dry" or taken < 15e6 + 330 * n**2
 
 
 SMALL = TANK.replace("= 1 /", "= 0.01 /") + "&fluid water_level = 0.1 /\n"

@@ -262,7 +262,7 @@ contains
 
   !> Spheres of body a near the bed.
   subroutine list_bed(bed, blocks, a, self)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     type(contact_spheres_t), intent(inout) :: self
@@ -375,7 +375,7 @@ contains
 
   !> Contact points of pair p, a body and the bed, each sphere at the nearest place of the bed.
   subroutine add_bed_points(bed, blocks, self, p, gap, points)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(inout) :: self
     integer, intent(in) :: p

@@ -261,7 +261,7 @@ contains
   !> Contact points of body a and the bed: corners of the bed, corners of the body, crossing edges.
   !! The points inside the faces of a body do not touch it: as on a wall, some corner always does.
   subroutine add_bed_points(bed, blocks, a, speed, ahead, self, points)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     real(wp), intent(in) :: speed   !! of its points, at most [m/s]
@@ -271,6 +271,7 @@ contains
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(meeting_t) :: now
+    logical :: holds, ended
 
     now%poses%x_a = bed_place(bed, blocks%x(:, a))
     now%poses%q_a = blocks%q(:, a)
@@ -283,8 +284,13 @@ contains
     now%gap = ahead*speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    call add_feature_points(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
-      self%with_bed(a), points, bed)
+    associate (surface => self%surface(blocks%shape(a)), pair => self%with_bed(a))
+      call check_lists(now, surface, bed%surface, pair, self%search, holds, ended)
+      if (holds .and. n_chosen(pair%close) == 0) return
+      call update_views(now)
+      if (ended) call list_bed(bed, now, surface, self%search, pair%near)
+      call add_feature_points(holds, surface, bed%surface, self%search, now, pair, points)
+    end associate
   end subroutine add_bed_points
 
   !> Contact points of a listed pair of bodies.
@@ -297,6 +303,7 @@ contains
     type(meeting_t) :: now
     real(wp) :: apart, depth, normal(3), arm(3)
     integer :: a, b
+    logical :: holds, ended
 
     a = self%pairs(p)%a
     b = self%pairs(p)%b
@@ -324,40 +331,50 @@ contains
         call add_point(contact_point_t(a, b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
           min(surface_a%length, surface_b%length)), points)
       else
-        call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(p), points)
+        call check_lists(now, surface_a, surface_b, self%pairs(p), self%search, holds, ended)
+        if (holds .and. n_chosen(self%pairs(p)%close) == 0) return
+        call update_views(now)
+        if (ended) call list_features(now, surface_a, surface_b, self%search, self%pairs(p)%near)
+        call add_feature_points(holds, surface_a, surface_b, self%search, now, self%pairs(p), &
+          points)
       end if
     end associate
   end subroutine add_pair_points
 
-  !> Contact points of a pair of bodies, or of body a and the bed: vertices of b, vertices of a,
-  !! crossing edges. They come from the short list of the pair; this and the lists it comes from are
-  !! renewed first where they no longer hold.
-  subroutine add_feature_points(surface_a, surface_b, search, now, pair, points, bed)
+  !> Does the short list of a pair hold? If not, do the lists that it comes from, or how far must
+  !! new ones look?
+  pure subroutine check_lists(now, surface_a, surface_b, pair, search, holds, ended)
+    type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
+    type(pair_t), intent(in) :: pair
     type(search_t), intent(inout) :: search
-    type(meeting_t), intent(inout) :: now
+    logical, intent(out) :: holds             !! the short list
+    logical, intent(out) :: ended             !! the others do not
+    real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
+
+    ended = .false.
+    holds = short_list_holds(now, surface_a%bounding_radius, surface_b%bounding_radius, pair%close)
+    if (holds) return
+    ended = now%gap > pair%near%ahead .or. way_between(pair%near%when, now%poses, &
+      surface_a%bounding_radius, surface_b%bounding_radius) > pair%near%valid
+    if (ended) search%ahead = max(search%min_ahead, wider*now%gap)
+  end subroutine check_lists
+
+  !> Contact points of a pair of bodies, or of body a and the bed: vertices of b, vertices of a,
+  !! crossing edges. They come from the short list of the pair, which is renewed where it no longer
+  !! holds.
+  subroutine add_feature_points(holds, surface_a, surface_b, search, now, pair, points)
+    logical, intent(in) :: holds              !! the short list
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(search_t), intent(in) :: search
+    type(meeting_t), intent(in) :: now
     type(pair_t), intent(inout) :: pair
     type(contact_points_t), intent(inout) :: points
-    type(bed_t), intent(in), optional :: bed  !! where it is b
-    real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
     real(wp) :: way
-    logical :: holds
 
-    holds = short_list_holds(now, surface_a%bounding_radius, surface_b%bounding_radius, pair%close)
-    if (holds .and. n_chosen(pair%close) == 0) return
-    call update_views(now)
     if (.not. holds) then
       way = way_between(pair%near%when, now%poses, surface_a%bounding_radius, &
         surface_b%bounding_radius)
-      if (way > pair%near%valid .or. now%gap > pair%near%ahead) then
-        search%ahead = max(search%min_ahead, wider*now%gap)
-        if (present(bed)) then
-          call list_bed(bed, now, surface_a, search, pair%near)
-        else
-          call list_features(now, surface_a, surface_b, search, pair%near)
-        end if
-        way = 0.0_wp
-      end if
       call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
       if (n_chosen(pair%close) == 0) return
     end if
@@ -450,8 +467,8 @@ contains
       j = pair%close%item(m + 1)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      point = contact_point_t(a=pair%a, b=pair%b, id=size(surface_a%weight) + i, other=j, &
-        length=min(surface_a%length, surface_b%length))
+      point = contact_point_t(a=pair%a, b=pair%b, id=size(surface_a%weight) + i, &
+        other=surface_b%edge_number(j), length=min(surface_a%length, surface_b%length))
       call cross_edges(guest, surface_b%edge(j), -now%gap, point%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle
       arm = matmul(now%turn_b, crossing%place)

@@ -6,6 +6,7 @@ module near_features_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
+  use bed_surface_m, only: make_ready
   use surface_search_m, only: surface_t, near_list_t, found_t, gather_vertices, gather_edges, &
     gather_facets, search_surface, min_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
@@ -60,6 +61,7 @@ module near_features_m
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
     real(wp), allocatable :: away(:)             !! way before the two may cross [m]
+    real(wp) :: ready(3, 2) = 0.0_wp             !! corners of a box in which the bed is ready [m]
   end type near_features_t
 
   !> How far to look for features, and the lists of the search.
@@ -76,6 +78,7 @@ module near_features_m
   end type search_t
 
   real(wp), parameter :: max_skin = 4.0_wp      !! largest skin over the least
+  real(wp), parameter :: ready_share = 0.25_wp  !! way for which the bed is made ready, over a radius
 
 contains
 
@@ -99,19 +102,26 @@ contains
 
   !> Lists of a body and the bed.
   subroutine list_bed(bed, now, surface, search, near)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface       !! of the body
     type(search_t), intent(inout) :: search
     type(near_features_t), intent(inout) :: near
-    real(wp) :: margin, place(3), distance, outward(3)
+    real(wp) :: margin, reach, place(3), distance, outward(3)
     integer :: i
 
     call begin_lists(now%poses, search%ahead, near)
     near%valid = skin_for(now%speed, search)
     margin = near%valid + search%ahead
+    ! no search below looks further from the centre, but for a corner deep in the bed
+    reach = surface%bounding_radius + 3*margin + surface%length
     associate (x => now%poses%x_a, cutoff => surface%bounding_radius + margin)
       if (.not. bed_is_near(bed, x - cutoff, x + cutoff)) return
+      if (any(x - reach < near%ready(:, 1)) .or. any(x + reach > near%ready(:, 2))) then
+        near%ready(:, 1) = x - reach - ready_share*surface%bounding_radius
+        near%ready(:, 2) = x + reach + ready_share*surface%bounding_radius
+        call make_ready(near%ready(:, 1), near%ready(:, 2), bed, search%found)
+      end if
     end associate
     call list_vertices(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
     call list_crossings(now%a_in_b, surface, bed%surface, search, near)
@@ -123,8 +133,9 @@ contains
       call bed_distance(bed, place, margin, max(margin, surface%bounding_radius), search%found, &
         distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
-      call append_near(bed%surface, i, place, abs(distance) + 2*(near%valid + search%ahead), &
-        search, near%of_a)
+      reach = abs(distance) + 2*(near%valid + search%ahead)
+      if (distance < -margin) call make_ready(place - reach, place + reach, bed, search%found)
+      call append_near(bed%surface, i, place, reach, search, near%of_a)
       near%of_a%away(near%of_a%n) = distance - surface%ball
     end do
     call end_lists(near%of_a)
@@ -289,7 +300,7 @@ contains
       call gather_edges(surface_b, low, high, search%hosts)
       do k = 1, search%hosts%n
         j = search%hosts%item(k)
-        if (j > surface_b%n_convex) exit
+        if (surface_b%edge_number(j) > surface_b%n_convex) exit
         away = way_to_crossing(guest, surface_b%edge(j), near%valid, cutoff, &
           min(surface_a%bounding_radius, surface_b%bounding_radius))
         ! Append a pair of edges that may cross.

@@ -11,7 +11,8 @@ module overlap_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
-  use surface_search_m, only: found_t, gather_edges, search_surface
+  use bed_surface_m, only: make_edges
+  use surface_search_m, only: found_t, search_surface
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
   use deep_overlaps_m, only: deep_overlaps_t, store_overlap, size_of_pair, reported_share
@@ -245,7 +246,7 @@ contains
     type(solid_t), intent(in) :: body
     real(wp), intent(in) :: position(3)  !! centre of mass [m]
     real(wp), intent(in) :: turn(3, 3)   !! body to space
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed
     type(found_t), intent(inout) :: found   !! work
     real(wp), intent(inout) :: depth
     real(wp) :: x(3), p(3), distance, outward(3)
@@ -273,9 +274,9 @@ contains
         depth = max(depth, -distance)
       end do
     end do
-    call gather_edges(bed%surface, x - body%radius, x + body%radius, found%edges)
+    call make_edges(x - body%radius, x + body%radius, bed, found%edges)
     do m = 1, found%edges%n
-      if (found%edges%item(m) > bed%surface%n_convex) exit
+      if (bed%surface%edge_number(found%edges%item(m)) > bed%surface%n_convex) exit
       associate (edge => bed%surface%edge(found%edges%item(m)))
         do i = 0, ceiling(edge%extent/body%spacing)
           p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x

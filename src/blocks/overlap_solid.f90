@@ -98,7 +98,6 @@ contains
     type(solid_t), intent(inout) :: solid
     real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between coplanar triangles
     real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
-    type(shape_t) :: net                         ! the same surface as facets
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: normal(:, :)
     logical, allocatable :: on_surface(:)
@@ -115,10 +114,7 @@ contains
       on_surface(triangle(:, t)) = .true.
     end do
     solid%corner = shape%point(:, pack([(i, i=1, size(on_surface))], on_surface))
-    net%point = shape%point
-    net%facet = [(3*t + 1, t=0, size(triangle, 2))]
-    net%facet_point = reshape(triangle, [size(triangle)])
-    call pair_edges(net, edge)
+    call pair_edges(size(shape%point, 2), [(3*t + 1, t=0, size(triangle, 2))], triangle, edge)
     do pass = 1, 2   ! count, then fill
       total = size(solid%corner, 2)
       if (pass == 2) solid%sample(:, :total) = solid%corner

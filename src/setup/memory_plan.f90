@@ -23,9 +23,10 @@ module memory_plan_m
   integer(i8), parameter :: bytes_of_landing = 36      !! more for each cell where blocks land [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
   integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]
-  integer(i8), parameter :: bytes_of_bed(2) = [220, 212]        !! of a facet, of a bent edge [B]
+  integer(i8), parameter :: bytes_of_bed(2) = [78, 38]          !! of a facet, of a bent edge [B]
+  integer(i8), parameter :: bytes_left = 17000000      !! at rest, without a bed or cells [B]
+  integer(i8), parameter :: bytes_at_blocks(2) = [140, 190]     !! the same, made for contact [B]
   integer(i8), parameter :: bytes_of_bed_solid = 2450           !! of a facet, for the flow [B]
-  integer(i8), parameter :: bytes_to_make_bed(2) = [420, 162]   !! the same at the start [B]
   integer(i8), parameter :: bytes_at_rest = 30000000   !! program and libraries [B]
   integer, parameter :: halo = 3                       !! cells beside the domain, on each side
 
@@ -37,7 +38,9 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
     integer(i8) :: bytes
+    real(wp), parameter :: reach = 1.5_wp   ! of what is made of a bed, over the radius of a block
     integer(i8) :: each, blocks, features(2)
+    real(wp) :: share
     integer :: s
 
     blocks = size(case%body) + sum(int(case%drop%count, i8))
@@ -52,11 +55,14 @@ contains
     do s = 1, size(shapes)
       bytes = bytes + bytes_per_piece*(size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius))
     end do
-    if (.not. bed%there) return   ! else most while it is made, or while the run goes on
-    features = [size(bed%triangle, 2), size(bed%surface%edge)]
+    if (.not. bed%there) return
+    features = [size(bed%triangle, 2), size(bed%edge, 2)]
+    share = 0.0_wp   ! of the bed that blocks come near, where they fall beside one another
+    if (blocks > 0) share = min(1.0_wp, real(blocks, wp)*(2*reach*maxval(shapes%radius))**2 &
+      /product(bed%surface%high(:2) - bed%surface%low(:2)))
+    bytes = bytes + max(0_i8, nproc()*(sum(bytes_of_bed*features) - bytes_left &
+      + int(share*sum(bytes_at_blocks*features), i8)))
     if (has_flow(case%run)) bytes = bytes + nproc()*bytes_of_bed_solid*features(1)
-    bytes = max(bytes + nproc()*sum(bytes_of_bed*features), &
-      bytes_at_rest + nproc()*sum(bytes_to_make_bed*features))
   end function planned_memory
 
   !> End with code 4 if the share of this process, or of another one, in the memory that the run

@@ -13,11 +13,10 @@ module bed_m
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
   use polygon_m, only: clip_polygon
-  use tet_mesh_m, only: shape_t
-  use neighbours_m, only: bins_t, bins_build
-  use surface_features_m, only: surface_init, pair_edges
-  use surface_search_m, only: surface_t, found_t, gather_edges, gather_facets, &
-    nearest_on_surface, nowhere
+  use neighbours_m, only: bins_t, bins_of_sets
+  use surface_features_m, only: set_plane
+  use surface_search_m, only: found_t, nearest_on_surface, nowhere
+  use bed_surface_m, only: bed_t, make_bed_surface, make_facets, make_edges
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
   private
@@ -28,18 +27,6 @@ module bed_m
   integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
 
-  type :: bed_t
-    logical :: there = .false.
-    real(wp), allocatable :: point(:, :)       !! (3, n) with the repetitions [m]
-    integer, allocatable :: triangle(:, :)     !! (3, m) counter-clockwise from outside
-    real(wp) :: origin(3) = 0.0_wp             !! lower corner of the tank [m]
-    real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
-    type(surface_t) :: surface                 !! what touches and is touched
-    type(bins_t) :: columns                    !! the facets seen from above
-    integer :: n_given = 0                     !! triangles of the file, without the repetitions
-    character(:), allocatable :: checksum      !! of the file
-  end type bed_t
-
   !> The surface above and below a place: heights, and 1 for facets that look up, -1 for others.
   type :: layers_t
     integer :: n = 0
@@ -48,7 +35,6 @@ module bed_m
   end type layers_t
 
   real(wp), parameter :: round_off = 1.0e-6_wp   !! of coordinates in files, over the tank [-]
-  real(wp), parameter :: no_gap = 1.0e-13_wp     !! by which facets overlap, over the bed [-]
   real(wp), parameter :: same_place = 1.0e-7_wp  !! points nearer are one, over the bed [-]
 
 contains
@@ -132,12 +118,10 @@ contains
   !> Make a form ready: repeat it between periodic sides, join equal points, sort it.
   subroutine set_bed(case, form, bed, message)
     type(case_t), intent(in) :: case
-    type(bed_form_t), intent(in) :: form
+    type(bed_form_t), intent(inout) :: form   !! used up
     type(bed_t), intent(out) :: bed
     character(:), allocatable, intent(out) :: message   !! empty, or what is wrong
-    type(shape_t) :: net
-    real(wp), allocatable :: low(:, :), high(:, :)
-    real(wp) :: area, spacing, extent
+    real(wp) :: area, spacing, extent, within(3, 2)
     integer :: m, n
 
     message = ''
@@ -159,29 +143,11 @@ contains
         area = area + 0.5_wp*spacing
       end associate
     end do
-    spacing = sqrt(area/real(n, wp))
-    net%point = bed%point
-    net%facet = [(3*m - 2, m=1, n + 1)]
-    net%facet_point = reshape(bed%triangle, [3*n])
-    net%smallest_edge = 2*spacing   ! sets the bins only
-    call surface_init(net, bed%surface, with_net=.false.)
-    deallocate (net%point, net%facet, net%facet_point)
-    ! a place on the edge between two flat facets must not slip between them
-    bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
-    bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
-    bed%surface%vertex = bed%surface%vertex(:, :bed%surface%n_corners)
-    bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
-    call bins_build(bed%surface%vertex, bed%surface%vertex, spacing, bed%surface%vertices)
-    allocate (low(3, n), high(3, n))
-    do m = 1, n
-      low(:, m) = minval(bed%point(:, bed%triangle(:, m)), 2)
-      high(:, m) = maxval(bed%point(:, bed%triangle(:, m)), 2)
-    end do
-    low = near_tank(case, low)
-    high = near_tank(case, high)
-    low(3, :) = 0.0_wp
-    high(3, :) = 0.0_wp
-    call bins_build(low, high, mean_spacing(maxval(high, 2) - minval(low, 2), n), bed%columns)
+    call make_bed_surface(sqrt(area/real(n, wp)), bed)
+    within = near_tank(case)
+    within(3, :) = 0.0_wp
+    call bins_of_sets(bed%point, bed%triangle, mean_spacing(bed, within), bed%columns, &
+      within=within)
     bed%there = .true.
   end subroutine set_bed
 
@@ -189,7 +155,7 @@ contains
   !! or as many as the cells that are kept beyond a side reach.
   subroutine repeat_form(case, form, bed)
     type(case_t), intent(in) :: case
-    type(bed_form_t), intent(in) :: form
+    type(bed_form_t), intent(inout) :: form   !! used up
     type(bed_t), intent(inout) :: bed
     integer, parameter :: cells_beyond = 4
     integer :: times(3), i, j, copy, n, m
@@ -201,6 +167,11 @@ contains
     m = size(form%triangle, 2)
     bed%n_given = m
     copy = product(2*times + 1)
+    if (copy == 1) then
+      call move_alloc(form%point, bed%point)
+      call move_alloc(form%triangle, bed%triangle)
+      return
+    end if
     allocate (bed%point(3, n*copy), bed%triangle(3, m*copy))
     copy = 0
     do j = -times(2), times(2)
@@ -219,16 +190,15 @@ contains
     type(bed_t), intent(inout) :: bed
     type(bins_t) :: bins
     integer, allocatable :: number(:)
-    real(wp), allocatable :: low(:, :), high(:, :), point(:, :)
+    real(wp), allocatable :: point(:, :)
     real(wp) :: near
     integer :: i, m, n, bin, p, c(3)
 
     near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
-    low = near_tank(case, bed%point - near)
-    high = near_tank(case, bed%point + near)
-    call bins_build(low, high, mean_spacing(maxval(high, 2) - minval(low, 2), &
-                                            size(bed%triangle, 2)), bins)
-    allocate (number(size(bed%point, 2)), source=0)
+    n = size(bed%point, 2)
+    call bins_of_sets(bed%point, reshape([(i, i=1, n)], [1, n]), &
+      mean_spacing(bed, near_tank(case)), bins, near, near_tank(case))
+    allocate (number(n), source=0)
     n = 0
     do i = 1, size(number)
       bin = bins%number(bins%place(bed%point(:, i)))
@@ -254,33 +224,31 @@ contains
       m = m + 1
       bed%triangle(:, m) = c
     end do
-    bed%point = point
-    bed%triangle = bed%triangle(:, :m)
+    call move_alloc(point, bed%point)
+    if (m < size(bed%triangle, 2)) bed%triangle = bed%triangle(:, :m)
   end subroutine join_points
 
-  !> Points far from the tank moved to it: bins of the places beside it stay small where a bed has
-  !! points far away. Order along each axis is kept, so bins still find all they should.
-  pure function near_tank(case, x) result(moved)
+  !> Corners of the tank and its surroundings, to which bins move points far away [m].
+  pure function near_tank(case) result(corner)
     type(case_t), intent(in) :: case
-    real(wp), intent(in) :: x(:, :)   !! (3, n) [m]
-    real(wp) :: moved(3, size(x, 2))
-    integer :: i
+    real(wp) :: corner(3, 2)
 
-    associate (from => case%grid%origin, length => case%grid%length)
-      do i = 1, size(x, 2)
-        moved(:, i) = min(max(x(:, i), from - maxval(length)), from + length + maxval(length))
-      end do
-    end associate
+    corner(:, 1) = case%grid%origin - maxval(case%grid%length)
+    corner(:, 2) = case%grid%origin + case%grid%length + maxval(case%grid%length)
   end function near_tank
 
-  !> Side of a square that has the mean area of n facets seen from the largest side [m].
-  pure function mean_spacing(extent, n) result(spacing)
-    real(wp), intent(in) :: extent(3)   !! of the bed [m]
-    integer, intent(in) :: n
+  !> Side of a square that has the mean area of the facets of a bed seen from its largest side,
+  !! points far away moved into a box [m].
+  pure function mean_spacing(bed, within) result(spacing)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: within(3, 2)   !! corners of the box [m]
     real(wp) :: spacing
+    real(wp) :: extent(3)
 
+    extent = min(max(maxval(bed%point, 2), within(:, 1)), within(:, 2)) &
+      - min(max(minval(bed%point, 2), within(:, 1)), within(:, 2))
     spacing = sqrt(max(extent(1)*extent(2), extent(2)*extent(3), extent(3)*extent(1)) &
-                   /real(max(1, n), wp))
+                   /real(max(1, size(bed%triangle, 2)), wp))
   end function mean_spacing
 
   !> An open edge of the surface inside the tank, or at a periodic side: the solid would end there
@@ -289,24 +257,17 @@ contains
     type(case_t), intent(in) :: case
     type(bed_t), intent(in) :: bed
     character(:), allocatable, intent(out) :: message
-    type(shape_t) :: net
-    integer, allocatable :: edge(:, :)
     real(wp) :: p(3, 2), low(3), high(3), slack(3), from, to, at(2)
-    integer :: e, d, n, m
+    integer :: e, d, n
 
     message = ''
-    net%point = bed%point
-    net%facet = [(3*m - 2, m=1, size(bed%triangle, 2) + 1)]
-    net%facet_point = reshape(bed%triangle, [size(bed%triangle)])
-    call pair_edges(net, edge)
     slack = round_off*case%grid%length   ! a periodic side is inside
     where (case%boundary%kind(1, :) == 'periodic') slack = -slack
     low = case%grid%origin + slack
     high = case%grid%origin + case%grid%length - slack
     n = 0
-    do e = 1, size(edge, 2)
-      if (edge(4, e) /= 0) cycle
-      p = bed%point(:, edge(1:2, e))
+    do e = 1, size(bed%open_edge, 2)
+      p = bed%point(:, bed%open_edge(:, e))
       if (maxval(p(3, :)) <= low(3)) cycle
       from = 0.0_wp   ! the part of the edge inside the tank, seen from above
       to = 1.0_wp
@@ -450,10 +411,10 @@ contains
     integer, intent(in) :: f
     real(wp), intent(in) :: at(3)
     real(wp) :: height
+    real(wp) :: n(3), offset
 
-    associate (n => bed%surface%normal(:, f))
-      height = (bed%surface%offset(f) - n(1)*at(1) - n(2)*at(2))/n(3)
-    end associate
+    call set_plane(bed%point(:, bed%triangle(:, f)), n, offset)
+    height = (offset - n(1)*at(1) - n(2)*at(2))/n(3)
   end function height_of
 
   !> Does the solid of the bed hold a point?
@@ -513,7 +474,7 @@ contains
   !> Signed distance of a point from the bed (positive outside), and the unit vector along which it
   !! grows: exact up to `near` outside and up to `far` inside; beyond that `nowhere` or -`far`.
   subroutine bed_distance(bed, x, near, far, found, distance, outward)
-    type(bed_t), intent(in) :: bed
+    type(bed_t), intent(inout) :: bed     !! made ready where it is searched
     real(wp), intent(in) :: x(3)          !! [m]
     real(wp), intent(in) :: near, far     !! near <= far [m]
     type(found_t), intent(inout) :: found   !! work
@@ -524,8 +485,8 @@ contains
 
     cutoff = near
     do
-      call gather_facets(bed%surface, x - cutoff, x + cutoff, found%facets)
-      call gather_edges(bed%surface, x - cutoff, x + cutoff, found%edges)
+      call make_facets(x - cutoff, x + cutoff, bed, found%facets)
+      call make_edges(x - cutoff, x + cutoff, bed, found%edges)
       call nearest_on_surface(bed%surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
       if (abs(distance) <= cutoff) return

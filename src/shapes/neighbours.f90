@@ -4,7 +4,7 @@ module neighbours_m
   use growing_m, only: ensure_capacity
   implicit none
   private
-  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
+  public :: bins_t, bins_build, bins_of_sets, pair_list_t, near_pairs, nearest_shift
   public :: sort_bodies, add_neighbours
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
@@ -32,26 +32,53 @@ module neighbours_m
 contains
 
   !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
-  !!
-  !! The size grows where the block would hold more than `max_bins`, or where large boxes would be
-  !! listed in too many bins.
   subroutine bins_build(low, high, size_wanted, bins)
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
     real(wp), intent(in) :: size_wanted             !! [m]
     type(bins_t), intent(out) :: bins
+    integer :: i, n
+
+    n = size(low, 2)
+    call bins_of_sets(reshape([low, high], [3, 2*n]), reshape([(i, n + i, i=1, n)], [2, n]), &
+      size_wanted, bins)
+  end subroutine bins_build
+
+  !> Sort the boxes around sets of points into bins of about the given size.
+  !!
+  !! The size grows where the block would hold more than `max_bins`, or where large boxes would be
+  !! listed in too many bins.
+  subroutine bins_of_sets(point, set, size_wanted, bins, more, within)
+    real(wp), intent(in) :: point(:, :)         !! (3, points) [m]
+    integer, intent(in) :: set(:, :)            !! (points of each, items) numbers of points
+    real(wp), intent(in) :: size_wanted         !! [m]
+    type(bins_t), intent(out) :: bins
+    real(wp), intent(in), optional :: more      !! by which the boxes are larger, default 0 [m]
+    real(wp), intent(in), optional :: within(3, 2)
+      !! lower and upper corner of a box to which theirs are moved: bins stay small where there are
+      !! points far away, and find all they should, since the order along each axis is kept [m]
     integer, parameter :: max_bins = 200000
     integer(i8), parameter :: often = 100_i8             !! entries of a box on average
     integer(i8), parameter :: few = 10000000_i8, most = 1000000000_i8   !! entries in all
-    real(wp) :: extent(3), edge
+    real(wp) :: extent(3), edge, low(3), high(3), bound(3, 2), add
+    integer :: i
 
-    if (size(low, 2) == 0) then
+    add = 0.0_wp
+    if (present(more)) add = more
+    bound = spread([-huge(1.0_wp), huge(1.0_wp)], 1, 3)
+    if (present(within)) bound = within
+    if (size(set, 2) == 0) then
       bins%n = 1
       allocate (bins%first(2), source=1)
       allocate (bins%item(0))
       return
     end if
-    bins%low = minval(low, 2)
-    bins%high = maxval(high, 2)
+    bins%low = huge(1.0_wp)
+    bins%high = -huge(1.0_wp)
+    do i = 1, size(set, 2)
+      call get_box(point, set(:, i), add, bound, low, high)
+      bins%low = min(bins%low, low)
+      bins%high = max(bins%high, high)
+    end do
     extent = bins%high - bins%low
     edge = max(size_wanted, maxval(extent)/real(max_bins, wp))
     if (.not. edge > 0.0_wp) edge = 1.0_wp   ! all in one place
@@ -59,12 +86,30 @@ contains
       edge = 1.25_wp*edge
     end do
     call set_size(extent, edge, bins)
-    do while (entries(low, high, bins) > min(max(few, often*int(size(low, 2), i8)), most))
+    do while (entries(point, set, add, bound, bins) > min(max(few, often*int(size(set, 2), i8)), most))
       edge = 2*edge
       call set_size(extent, edge, bins)
     end do
-    call fill_bins(low, high, bins)
-  end subroutine bins_build
+    call fill_bins(point, set, add, bound, bins)
+  end subroutine bins_of_sets
+
+  !> The box around a set of points.
+  pure subroutine get_box(point, set, more, within, low, high)
+    real(wp), intent(in) :: point(:, :)           !! (3, points) [m]
+    integer, intent(in) :: set(:)                 !! numbers of points
+    real(wp), intent(in) :: more, within(3, 2)    !! as in `bins_of_sets`
+    real(wp), intent(out) :: low(3), high(3)      !! [m]
+    integer :: c
+
+    low = point(:, set(1))
+    high = low
+    do c = 2, size(set)
+      low = min(low, point(:, set(c)))
+      high = max(high, point(:, set(c)))
+    end do
+    low = min(max(low - more, within(:, 1)), within(:, 2))
+    high = min(max(high + more, within(:, 1)), within(:, 2))
+  end subroutine get_box
 
   !> Number of the bins and their size, about a given one.
   pure subroutine set_size(extent, edge, bins)
@@ -76,30 +121,36 @@ contains
   end subroutine set_size
 
   !> In how many bins the boxes would be listed, all together.
-  pure function entries(low, high, bins) result(n)
-    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
+  pure function entries(point, set, more, within, bins) result(n)
+    real(wp), intent(in) :: point(:, :), more, within(3, 2)   !! as in `bins_of_sets`
+    integer, intent(in) :: set(:, :)
     type(bins_t), intent(in) :: bins
     integer(i8) :: n
+    real(wp) :: low(3), high(3)
     integer :: m
 
     n = 0
-    do m = 1, size(low, 2)
-      n = n + product(int(bins%place(high(:, m)) - bins%place(low(:, m)) + 1, i8))
+    do m = 1, size(set, 2)
+      call get_box(point, set(:, m), more, within, low, high)
+      n = n + product(int(bins%place(high) - bins%place(low) + 1, i8))
     end do
   end function entries
 
   !> List every box in the bins it meets.
-  subroutine fill_bins(low, high, bins)
-    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
+  subroutine fill_bins(point, set, more, within, bins)
+    real(wp), intent(in) :: point(:, :), more, within(3, 2)   !! as in `bins_of_sets`
+    integer, intent(in) :: set(:, :)
     type(bins_t), intent(inout) :: bins
+    real(wp) :: low(3), high(3)
     integer :: i, j, k, c, m, pass, a(3), b(3)
     integer, allocatable :: next(:)
 
     allocate (bins%first(product(bins%n) + 1), next(product(bins%n)), source=0)
     do pass = 1, 2   ! count, then fill
-      do m = 1, size(low, 2)
-        a = bins%place(low(:, m))
-        b = bins%place(high(:, m))
+      do m = 1, size(set, 2)
+        call get_box(point, set(:, m), more, within, low, high)
+        a = bins%place(low)
+        b = bins%place(high)
         do k = a(3), b(3)
           do j = a(2), b(2)
             do i = a(1), b(1)

@@ -9,9 +9,11 @@ module surface_features_m
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_build
   use surface_search_m, only: surface_t, found_t, search_surface
+  use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_init, pair_edges
+  public :: surface_init, pair_edges, set_plane, set_facet, edge_between, bend_of, angles_of, &
+    find_corners
 
   real(wp), parameter :: sharp = 1.0e-3_wp     !! sine by which facets differ at a sharp edge: more
     !! than by the digits of a file, less than on a smooth form that is cut finely
@@ -22,7 +24,7 @@ module surface_features_m
 
 contains
 
-  !> Features of a shape. `min_distance` needs the net of distances; a bed does without.
+  !> Features of a shape. `min_distance` needs the net of distances.
   subroutine surface_init(shape, surface, with_net)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(out) :: surface
@@ -30,8 +32,7 @@ contains
     integer, allocatable :: edge(:, :), bend(:)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: is_corner(:)
-    integer :: e, f, c, before
-    real(wp) :: p(3), u(3), w(3)
+    integer :: e, f
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -44,24 +45,20 @@ contains
     end if
     surface%length = 0.25_wp*shape%smallest_edge
     call make_facets(shape, surface)
-    call pair_edges(shape, edge)
-    ! Sum of the normals of the facets at each point, weighted by their angle there: it points
-    ! outward as seen from any place nearest to that point (Baerentzen and Aanaes, 2005).
+    call pair_edges(size(shape%point, 2), shape%facet, shape%facet_point, edge)
     allocate (point_normal(3, size(shape%point, 2)), source=0.0_wp)
     do f = 1, size(surface%normal, 2)
-      before = shape%facet(f + 1) - 1
-      do c = shape%facet(f), shape%facet(f + 1) - 1
-        p = shape%point(:, shape%facet_point(c))
-        u = shape%point(:, next_corner(shape, f, c)) - p
-        w = shape%point(:, shape%facet_point(before)) - p
-        associate (sum_here => point_normal(:, shape%facet_point(c)))
-          sum_here = sum_here + atan2(norm(cross(u, w)), dot_product(u, w))*surface%normal(:, f)
-        end associate
-        before = c
-      end do
+      associate (c => corners(shape, f), normal => surface%normal(:, f))
+        point_normal(:, c) = point_normal(:, c) + spread(normal, 2, size(c)) &
+          *spread(angles_of(shape%point(:, c)), 1, 3)
+      end associate
     end do
-    bend = [(bend_of(shape, edge(:, e), surface%normal), e=1, size(edge, 2))]
-    call find_corners(shape, edge, bend, point_normal, is_corner)
+    allocate (bend(size(edge, 2)), source=0)
+    do e = 1, size(edge, 2)
+      if (edge(4, e) > 0) bend(e) = bend_of(shape%point(:, edge(1:2, e)), &
+        surface%normal(:, edge(3:4, e)))
+    end do
+    call find_corners(shape%point, edge, bend, point_normal, is_corner)
     call make_edges(shape, edge, bend, point_normal, surface)
     call make_vertices(shape, is_corner, surface)
     call sort_into_bins(shape, surface)
@@ -75,8 +72,7 @@ contains
   pure subroutine make_facets(shape, surface)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(inout) :: surface
-    real(wp) :: p(3), next(3), middle(3)
-    integer :: f, c, n, m
+    integer :: f, n
 
     n = size(shape%facet) - 1
     surface%side = shape%facet
@@ -84,18 +80,56 @@ contains
     allocate (surface%side_normal(3, size(shape%facet_point)))
     allocate (surface%side_offset(size(shape%facet_point)))
     do f = 1, n
-      surface%normal(:, f) = facet_normal(shape, f)
-      m = shape%facet(f + 1) - shape%facet(f)
-      middle = sum(shape%point(:, corners(shape, f)), 2)/real(m, wp)
-      surface%offset(f) = dot_product(surface%normal(:, f), middle)
-      do c = shape%facet(f), shape%facet(f + 1) - 1
-        p = shape%point(:, shape%facet_point(c))
-        next = shape%point(:, next_corner(shape, f, c))
-        surface%side_normal(:, c) = cross(surface%normal(:, f), (next - p)/norm(next - p))
-        surface%side_offset(c) = dot_product(surface%side_normal(:, c), p)
-      end do
+      associate (a => shape%facet(f), b => shape%facet(f + 1) - 1)
+        call set_facet(shape%point(:, corners(shape, f)), surface%normal(:, f), &
+          surface%offset(f), surface%side_normal(:, a:b), surface%side_offset(a:b))
+      end associate
     end do
   end subroutine make_facets
+
+  !> Plane and sides of a facet.
+  pure subroutine set_facet(p, normal, offset, side_normal, side_offset)
+    real(wp), intent(in) :: p(:, :)          !! (3, n) corners, counter-clockwise from outside [m]
+    real(wp), intent(out) :: normal(3), offset, side_normal(:, :), side_offset(:)
+      !! see `surface_t`
+    integer :: c
+
+    call set_plane(p, normal, offset)
+    do c = 1, size(p, 2)
+      associate (along => p(:, 1 + mod(c, size(p, 2))) - p(:, c))
+        side_normal(:, c) = cross(normal, along/norm(along))
+      end associate
+      side_offset(c) = dot_product(side_normal(:, c), p(:, c))
+    end do
+  end subroutine set_facet
+
+  !> Outward unit normal of a facet, and its product with the points of the plane.
+  pure subroutine set_plane(p, normal, offset)
+    real(wp), intent(in) :: p(:, :)               !! as in `set_facet`
+    real(wp), intent(out) :: normal(3), offset    !! [-], [m]
+
+    normal = area_vector(p)
+    normal = normal/norm(normal)
+    offset = dot_product(normal, sum(p, 2)/real(size(p, 2), wp))
+  end subroutine set_plane
+
+  !> Angles of a facet at its corners.
+  !!
+  !! The sum of the normals of the facets at a point, weighted by these, points outward as seen from
+  !! any place nearest to that point (Baerentzen and Aanaes, 2005).
+  pure function angles_of(p) result(angle)
+    real(wp), intent(in) :: p(:, :)   !! as in `set_facet`
+    real(wp) :: angle(size(p, 2))
+    real(wp) :: u(3), w(3)
+    integer :: c, n
+
+    n = size(p, 2)
+    do c = 1, n
+      u = p(:, 1 + mod(c, n)) - p(:, c)
+      w = p(:, 1 + mod(c + n - 2, n)) - p(:, c)
+      angle(c) = atan2(norm(cross(u, w)), dot_product(u, w))
+    end do
+  end function angles_of
 
   !> Numbers of the corners of facet f.
   pure function corners(shape, f) result(p)
@@ -106,55 +140,34 @@ contains
     p = shape%facet_point(shape%facet(f):shape%facet(f + 1) - 1)
   end function corners
 
-  !> The corner of facet f after place c of `facet_point`.
-  pure function next_corner(shape, f, c) result(p)
-    type(shape_t), intent(in) :: shape
-    integer, intent(in) :: f, c
-    integer :: p
-
-    p = shape%facet_point(merge(c + 1, shape%facet(f), c + 1 < shape%facet(f + 1)))
-  end function next_corner
-
-  !> Twice the area of facet f times its outward unit normal, without the length: the unit normal.
-  pure function facet_normal(shape, f) result(normal)
-    type(shape_t), intent(in) :: shape
-    integer, intent(in) :: f
-    real(wp) :: normal(3)
-
-    normal = area_vector(shape, f)
-    normal = normal/norm(normal)
-  end function facet_normal
-
-  !> Area of facet f times its outward unit normal [m2].
-  pure function area_vector(shape, f) result(area)
-    type(shape_t), intent(in) :: shape
-    integer, intent(in) :: f
+  !> Area of a facet times its outward unit normal [m2].
+  pure function area_vector(p) result(area)
+    real(wp), intent(in) :: p(:, :)   !! as in `set_facet`
     real(wp) :: area(3)
-    real(wp) :: p(3)
     integer :: c
 
-    p = shape%point(:, shape%facet_point(shape%facet(f)))
     area = 0.0_wp
-    do c = shape%facet(f) + 1, shape%facet(f + 1) - 2
-      area = area + 0.5_wp*cross(shape%point(:, shape%facet_point(c)) - p, &
-        shape%point(:, shape%facet_point(c + 1)) - p)
+    do c = 2, size(p, 2) - 1
+      area = area + 0.5_wp*cross(p(:, c) - p(:, 1), p(:, c + 1) - p(:, 1))
     end do
   end function area_vector
 
   !> Edges of the net of facets, each once: start, end, the facet that runs it that way, the other.
-  pure subroutine pair_edges(shape, edge)
-    type(shape_t), intent(in) :: shape
+  pure subroutine pair_edges(n_points, first, corner, edge)
+    integer, intent(in) :: n_points, first(:)
+    integer, intent(in) :: corner(first(size(first)) - 1)
+      !! those of facet f are corner(first(f):first(f+1)-1)
     integer, allocatable, intent(out) :: edge(:, :)   !! (4, edges)
     integer, allocatable :: head(:), chain(:), found(:, :)
     integer :: f, c, a, b, e, n
 
-    allocate (found(4, size(shape%facet_point)), chain(size(shape%facet_point)))
-    allocate (head(size(shape%point, 2)), source=0)   ! edges by their lower corner
+    allocate (found(4, size(corner)), chain(size(corner)))
+    allocate (head(n_points), source=0)   ! edges by their lower corner
     n = 0
-    do f = 1, size(shape%facet) - 1
-      do c = shape%facet(f), shape%facet(f + 1) - 1
-        a = shape%facet_point(c)
-        b = next_corner(shape, f, c)
+    do f = 1, size(first) - 1
+      do c = first(f), first(f + 1) - 1
+        a = corner(c)
+        b = corner(merge(c + 1, first(f), c + 1 < first(f + 1)))
         e = head(min(a, b))
         do while (e > 0)
           if (found(1, e) == b .and. found(2, e) == a .and. found(4, e) == 0) exit
@@ -176,8 +189,8 @@ contains
   !> Corners that may touch: where a sharp convex edge ends, since past its end the crossing with
   !! another edge does not count (on a saddle of a bed an edge rests on such a corner though others
   !! rise from it); and those that stick out, from which all edges fall away.
-  pure subroutine find_corners(shape, edge, bend, point_normal, is_corner)
-    type(shape_t), intent(in) :: shape
+  pure subroutine find_corners(point, edge, bend, point_normal, is_corner)
+    real(wp), intent(in) :: point(:, :)           !! (3, points) [m]
     integer, intent(in) :: edge(:, :), bend(:)    !! (4, edges), (edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
     logical, allocatable, intent(out) :: is_corner(:)  !! (points)
@@ -185,10 +198,10 @@ contains
     real(wp) :: along(3)
     integer :: e, c
 
-    allocate (is_corner(size(shape%point, 2)))
+    allocate (is_corner(size(point, 2)))
     is_corner = norms(point_normal) > 0.0_wp
     do e = 1, size(edge, 2)
-      along = shape%point(:, edge(2, e)) - shape%point(:, edge(1, e))
+      along = point(:, edge(2, e)) - point(:, edge(1, e))
       along = along/norm(along)
       do c = 1, 2
         associate (outward => point_normal(:, edge(c, e)))
@@ -219,34 +232,40 @@ contains
         if (bend(e) /= wanted) cycle
         m = m + 1
         surface%end_outward(:, :, m) = point_normal(:, edge(1:2, e))
-        associate (new => surface%edge(m))
-          new%start = shape%point(:, edge(1, e))
-          new%along = shape%point(:, edge(2, e)) - new%start
-          new%extent = norm(new%along)
-          new%along = new%along/new%extent
-          new%into(:, 1) = cross(surface%normal(:, edge(3, e)), new%along)
-          new%into(:, 2) = -cross(surface%normal(:, edge(4, e)), new%along)
-          new%outward = surface%normal(:, edge(3, e)) + surface%normal(:, edge(4, e))
-        end associate
+        surface%edge(m) = edge_between(shape%point(:, edge(1:2, e)), &
+          surface%normal(:, edge(3:4, e)))
       end do
     end do
+    surface%edge_number = [(e, e=1, m)]
   end subroutine make_edges
 
-  !> 1: the edge is convex and sharp, -1: reentrant or convex but not sharp, 0: flat or open.
-  pure function bend_of(shape, edge, normal) result(bend)
-    type(shape_t), intent(in) :: shape
-    integer, intent(in) :: edge(4)
-    real(wp), intent(in) :: normal(:, :)          !! (3, facets)
+  !> The edge between two facets.
+  pure function edge_between(ends, normal) result(edge)
+    real(wp), intent(in) :: ends(3, 2)     !! start, end [m]
+    real(wp), intent(in) :: normal(3, 2)   !! of the facet that runs it that way, of the other
+    type(edge_t) :: edge
+
+    edge%start = ends(:, 1)
+    edge%along = ends(:, 2) - edge%start
+    edge%extent = norm(edge%along)
+    edge%along = edge%along/edge%extent
+    edge%into(:, 1) = cross(normal(:, 1), edge%along)
+    edge%into(:, 2) = -cross(normal(:, 2), edge%along)
+    edge%outward = normal(:, 1) + normal(:, 2)
+  end function edge_between
+
+  !> 1: the edge is convex and sharp, -1: reentrant or convex but not sharp, 0: flat.
+  pure function bend_of(ends, normal) result(bend)
+    real(wp), intent(in) :: ends(3, 2), normal(3, 2)   !! as in `edge_between`
     integer :: bend
     real(wp), parameter :: flat = 1.0e-9_wp
     real(wp) :: along(3), fall
 
     bend = 0
-    if (edge(4) == 0) return
-    along = shape%point(:, edge(2)) - shape%point(:, edge(1))
+    along = ends(:, 2) - ends(:, 1)
     along = along/norm(along)
-    fall = dot_product(normal(:, edge(3)), cross(normal(:, edge(4)), along))
-    if (abs(fall) < flat .and. dot_product(normal(:, edge(3)), normal(:, edge(4))) > 0.0_wp) return
+    fall = dot_product(normal(:, 1), cross(normal(:, 2), along))
+    if (abs(fall) < flat .and. dot_product(normal(:, 1), normal(:, 2)) > 0.0_wp) return
     bend = merge(1, -1, fall > sharp)
   end function bend_of
 
@@ -267,11 +286,11 @@ contains
       n = shape%facet(f + 1) - shape%facet(f)
       weight(corners(shape, f)) = min(weight(corners(shape, f)), flat_sum/real(n, wp))
     end do
-    whole = sum([(norm(area_vector(shape, f)), f=1, size(shape%facet) - 1)])
+    whole = sum([(area(f), f=1, size(shape%facet) - 1)])
     n = count(is_corner)
     surface%n_corners = n
     do f = 1, size(shape%facet) - 1
-      if (norm(area_vector(shape, f)) > large*whole) n = n + size(corners(shape, f))
+      if (area(f) > large*whole) n = n + size(corners(shape, f))
     end do
     allocate (surface%vertex(3, n), surface%weight(n), surface%facing(3, surface%n_corners + 1:n))
     n = 0
@@ -282,7 +301,7 @@ contains
       surface%weight(n) = weight(c)
     end do
     do f = 1, size(shape%facet) - 1
-      if (norm(area_vector(shape, f)) <= large*whole) cycle
+      if (area(f) <= large*whole) cycle
       m = size(corners(shape, f))
       middle = sum(shape%point(:, corners(shape, f)), 2)/real(m, wp)
       do c = shape%facet(f), shape%facet(f + 1) - 1
@@ -292,6 +311,13 @@ contains
         surface%facing(:, n) = surface%normal(:, f)
       end do
     end do
+  contains
+    !> Area of facet f [m2].
+    pure real(wp) function area(f)
+      integer, intent(in) :: f
+
+      area = norm(area_vector(shape%point(:, corners(shape, f))))
+    end function area
   end subroutine make_vertices
 
   !> Bounding box and radius, bins.

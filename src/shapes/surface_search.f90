@@ -10,7 +10,7 @@ module surface_search_m
   use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_t, near_list_t, found_t, gather_vertices, gather_edges, gather_facets
+  public :: surface_t, near_list_t, found_t, gather, gather_vertices, gather_edges, gather_facets
   public :: nearest_on_surface, search_surface, min_distance, segment_distance2, nowhere
 
   type :: surface_t
@@ -28,8 +28,11 @@ module surface_search_m
     integer, allocatable :: side(:)              !! (n + 1) first side of each facet
     real(wp), allocatable :: side_normal(:, :), side_offset(:)    !! (3, :), (:) [m]
     type(edge_t), allocatable :: edge(:)         !! those that are not flat, convex ones first
+    integer, allocatable :: edge_number(:)       !! (n) of each, where convex ones come first
     integer :: n_convex = 0
     real(wp), allocatable :: end_outward(:, :, :)   !! (3, 2, n) outward at the start, at the end
+    integer, allocatable :: facet_at(:), edge_at(:)
+      !! a bed: where in these lists a facet, an edge is by its number; 0: not made yet
     type(bins_t) :: vertices, facets, edges
     real(wp) :: net_step(3) = 1.0_wp             !! of a net over the bounding box [m]
     real(wp), allocatable :: net(:, :, :)        !! signed distance at its nodes, from 0 [m]
@@ -61,30 +64,42 @@ contains
     call gather(surface%vertices, size(surface%weight), low, high, list)
   end subroutine gather_vertices
 
-  !> Edges whose bins meet a box; the box should not be much smaller than a bin.
+  !> Edges whose bins meet a box; the box should not be much smaller than a bin. Those of a bed are
+  !! made before (`make_edges` in `bed_surface_m`).
   subroutine gather_edges(surface, low, high, list)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
 
-    call gather(surface%edges, size(surface%edge), low, high, list)
+    if (allocated(surface%edge_at)) then
+      call gather(surface%edges, size(surface%edge_at), low, high, list)
+      list%item(:list%n) = surface%edge_at(list%item(:list%n))
+    else
+      call gather(surface%edges, size(surface%edge), low, high, list)
+    end if
   end subroutine gather_edges
 
-  !> Facets whose bins meet a box.
+  !> Facets whose bins meet a box, made before as edges are.
   subroutine gather_facets(surface, low, high, list)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
 
-    call gather(surface%facets, size(surface%offset), low, high, list)
+    if (allocated(surface%facet_at)) then
+      call gather(surface%facets, size(surface%facet_at), low, high, list)
+      list%item(:list%n) = surface%facet_at(list%item(:list%n))
+    else
+      call gather(surface%facets, size(surface%offset), low, high, list)
+    end if
   end subroutine gather_facets
 
   !> Items of the bins that meet a box, each once, ascending; all where there are more such bins.
-  subroutine gather(bins, n_items, low, high, list)
+  subroutine gather(bins, n_items, low, high, list, any_order)
     type(bins_t), intent(in) :: bins
     integer, intent(in) :: n_items
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
+    logical, intent(in), optional :: any_order   !! need not ascend, default false
     integer, parameter :: scan = 8   !! marks looked at for each item found: quicker than sorting
     integer :: a(3), b(3), i, j, k, m, bin, item, g
     integer, parameter :: gap(7) = [701, 301, 132, 57, 23, 10, 4]   !! Ciura (2001), and 1
@@ -121,6 +136,9 @@ contains
         end do
       end do
     end do
+    if (present(any_order)) then
+      if (any_order) return
+    end if
     if (n_items > scan*list%n) then
       ! Ascending order, by Shell's method: lists may be long over a fine bed.
       do g = 1, size(gap)

@@ -96,7 +96,7 @@ contains
 
   !> On a plane bed the point that reaches furthest against its normal touches.
   subroutine on_a_slope()
-    type(bed_form_t) :: form
+    type(bed_form_t) :: form, once
     character(:), allocatable :: message
     real(wp) :: n(3), turn(3, 3), expected
     integer :: k, s
@@ -109,7 +109,8 @@ contains
     call set(cube//'.5,.5,.8/')
     do s = 1, 4
       call set('&body shape="'//trim(world%shapes(s)%name)//'" position=.5,.5,.8/')
-      call set_bed(world%case, form, world%walls%bed, message)
+      once = form
+      call set_bed(world%case, once, world%walls%bed, message)
       call check('the bed is taken: '//message, len(message) == 0)
       do k = 1, 10
         world%blocks%q(:, 1) = random_rotation(s, k)

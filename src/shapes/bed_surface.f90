@@ -1,0 +1,218 @@
+!> The bed as a surface that blocks touch: few bytes for a point, made ready near the blocks.
+!!
+!! Blocks lie on few of a million facets: planes, sides and directions of facets and edges are made
+!! when something first comes near.
+module bed_surface_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_capacity
+  use vectors_m, only: norms
+  use neighbours_m, only: bins_t, bins_of_sets
+  use edge_crossing_m, only: edge_t
+  use surface_features_m, only: pair_edges, set_plane, set_facet, edge_between, bend_of, &
+    angles_of, find_corners
+  use surface_search_m, only: surface_t, near_list_t, found_t, gather
+  implicit none
+  private
+  public :: bed_t, make_bed_surface, make_facets, make_edges, make_ready
+
+  real(wp), parameter :: no_gap = 1.0e-13_wp     !! by which facets overlap, over the bed [-]
+
+  type :: bed_t
+    logical :: there = .false.
+    real(wp), allocatable :: point(:, :)       !! (3, n) with the repetitions [m]
+    integer, allocatable :: triangle(:, :)     !! (3, m) counter-clockwise from outside
+    real(wp) :: origin(3) = 0.0_wp             !! lower corner of the tank [m]
+    real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
+    type(surface_t) :: surface                 !! what touches and is touched, as far as it is made
+    integer :: n_made(2) = 0                   !! facets, edges that are
+    integer, allocatable :: edge(:, :)
+      !! (4, e) those that are not flat, convex ones first: start, end, the facet that runs it that
+      !! way, the other
+    integer, allocatable :: open_edge(:, :)    !! (2, o) start and end of those of one facet
+    real(wp), allocatable :: point_normal(:, :)   !! (3, n) outward, of any length
+    type(bins_t) :: columns                    !! the facets seen from above
+    integer :: n_given = 0                     !! triangles of the file, without the repetitions
+    character(:), allocatable :: checksum      !! of the file
+  end type bed_t
+
+contains
+
+  !> Find the edges and corners of the bed and sort all into bins.
+  subroutine make_bed_surface(spacing, bed)
+    real(wp), intent(in) :: spacing   !! of the bins: the mean side of a facet [m]
+    type(bed_t), intent(inout) :: bed
+    integer, allocatable :: edge(:, :), bend(:)
+    logical, allocatable :: is_corner(:)
+    real(wp), allocatable :: normal(:, :)
+    real(wp) :: p(3, 3), offset
+    integer :: c, e, f, m, n
+
+    n = size(bed%triangle, 2)
+    call pair_edges(size(bed%point, 2), [(3*f - 2, f=1, n + 1)], bed%triangle, edge)
+    allocate (bed%point_normal(3, size(bed%point, 2)), source=0.0_wp)
+    allocate (normal(3, n))
+    bed%surface%low = huge(1.0_wp)
+    bed%surface%high = -huge(1.0_wp)
+    do f = 1, n
+      p = bed%point(:, bed%triangle(:, f))
+      call set_plane(p, normal(:, f), offset)
+      associate (angle => angles_of(p))
+        do c = 1, 3
+          associate (sum_here => bed%point_normal(:, bed%triangle(c, f)))
+            sum_here = sum_here + angle(c)*normal(:, f)
+          end associate
+          bed%surface%low = min(bed%surface%low, p(:, c))
+          bed%surface%high = max(bed%surface%high, p(:, c))
+        end do
+      end associate
+      bed%surface%bounding_radius = max(bed%surface%bounding_radius, maxval(norms(p)))
+    end do
+    allocate (bend(size(edge, 2)), source=0)
+    do e = 1, size(edge, 2)
+      if (edge(4, e) > 0) bend(e) = bend_of(bed%point(:, edge(1:2, e)), normal(:, edge(3:4, e)))
+    end do
+    deallocate (normal)
+    call find_corners(bed%point, edge, bend, bed%point_normal, is_corner)
+    bed%open_edge = edge(1:2, pack([(e, e=1, size(bend))], edge(4, :) == 0))
+    m = count(bend /= 0)
+    allocate (bed%edge(4, m))
+    m = 0
+    do f = 1, -1, -2   ! convex, then reentrant
+      do e = 1, size(bend)
+        if (bend(e) /= f) cycle
+        m = m + 1
+        bed%edge(:, m) = edge(:, e)
+      end do
+      if (f == 1) bed%surface%n_convex = m
+    end do
+    deallocate (edge, bend)
+    call set_lists(spacing, is_corner, bed)
+  end subroutine make_bed_surface
+
+  !> The corners that touch, bins of all, and lists without facets and edges.
+  subroutine set_lists(spacing, is_corner, bed)
+    real(wp), intent(in) :: spacing        !! of the bins [m]
+    logical, intent(in) :: is_corner(:)    !! (points)
+    type(bed_t), intent(inout) :: bed
+    integer :: c, n
+    integer, parameter :: first_edges = 16
+
+    associate (surface => bed%surface)
+      n = count(is_corner)
+      surface%n_corners = n
+      allocate (surface%vertex(3, n), surface%weight(n))
+      surface%weight = 1.0_wp
+      n = 0
+      do c = 1, size(is_corner)
+        if (.not. is_corner(c)) cycle
+        n = n + 1
+        surface%vertex(:, n) = bed%point(:, c)
+      end do
+      surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
+      call bins_of_sets(surface%vertex, reshape([(c, c=1, n)], [1, n]), spacing, surface%vertices)
+      call bins_of_sets(bed%point, bed%triangle, spacing, surface%facets)
+      call bins_of_sets(bed%point, bed%edge(1:2, :), spacing, surface%edges)
+      allocate (surface%facet_at(size(bed%triangle, 2)), surface%edge_at(size(bed%edge, 2)), &
+                source=0)
+      allocate (surface%edge(first_edges), surface%end_outward(3, 2, first_edges))
+    end associate
+  end subroutine set_lists
+
+  !> Make the facets and edges in a box.
+  subroutine make_ready(low, high, bed, found)
+    real(wp), intent(in) :: low(3), high(3)    !! [m]
+    type(bed_t), intent(inout) :: bed
+    type(found_t), intent(inout) :: found      !! work
+
+    call make_facets(low, high, bed, found%facets, any_order=.true.)
+    call make_edges(low, high, bed, found%edges, any_order=.true.)
+  end subroutine make_ready
+
+  !> Facets whose bins meet a box: make those that are not there yet, and list them.
+  subroutine make_facets(low, high, bed, list, any_order)
+    real(wp), intent(in) :: low(3), high(3)    !! [m]
+    type(bed_t), intent(inout) :: bed
+    type(near_list_t), intent(inout) :: list   !! their places in the surface
+    logical, intent(in), optional :: any_order   !! see `gather`
+    integer :: m
+
+    call gather(bed%surface%facets, size(bed%surface%facet_at), low, high, list, any_order)
+    associate (s => bed%surface, f => list%item)
+      do m = 1, list%n
+        if (s%facet_at(f(m)) == 0) call add_facet(f(m), bed)
+        f(m) = s%facet_at(f(m))
+      end do
+    end associate
+  end subroutine make_facets
+
+  !> The same for edges.
+  subroutine make_edges(low, high, bed, list, any_order)
+    real(wp), intent(in) :: low(3), high(3)    !! as in `make_facets`
+    type(bed_t), intent(inout) :: bed
+    type(near_list_t), intent(inout) :: list
+    logical, intent(in), optional :: any_order
+    integer :: m
+
+    call gather(bed%surface%edges, size(bed%surface%edge_at), low, high, list, any_order)
+    associate (s => bed%surface, e => list%item)
+      do m = 1, list%n
+        if (s%edge_at(e(m)) == 0) call add_edge(e(m), bed)
+        e(m) = s%edge_at(e(m))
+      end do
+    end associate
+  end subroutine make_edges
+
+  !> Append facet f to the surface.
+  subroutine add_facet(f, bed)
+    integer, intent(in) :: f
+    type(bed_t), intent(inout) :: bed
+    integer :: n
+
+    n = bed%n_made(1) + 1
+    bed%n_made(1) = n
+    associate (s => bed%surface)
+      s%facet_at(f) = n
+      call ensure_capacity(n, s%normal)
+      call ensure_capacity(n, s%offset)
+      call ensure_capacity(n + 1, s%side)
+      call ensure_capacity(3*n, s%side_normal)
+      call ensure_capacity(3*n, s%side_offset)
+      s%side(n:n + 1) = [3*n - 2, 3*n + 1]
+      call set_facet(bed%point(:, bed%triangle(:, f)), s%normal(:, n), s%offset(n), &
+        s%side_normal(:, 3*n - 2:3*n), s%side_offset(3*n - 2:3*n))
+      ! a place on the edge between two flat facets must not slip between them
+      s%side_offset(3*n - 2:3*n) = s%side_offset(3*n - 2:3*n) - no_gap*maxval(abs([s%low, s%high]))
+    end associate
+  end subroutine add_facet
+
+  !> Append edge e to the surface.
+  subroutine add_edge(e, bed)
+    integer, intent(in) :: e
+    type(bed_t), intent(inout) :: bed
+    type(edge_t), allocatable :: edge(:)
+    real(wp), allocatable :: end_outward(:, :, :)
+    real(wp) :: normal(3, 2), offset
+    integer :: m, n
+
+    n = bed%n_made(2) + 1
+    bed%n_made(2) = n
+    associate (s => bed%surface)
+      if (n > size(s%edge)) then
+        allocate (edge(2*n), end_outward(3, 2, 2*n))
+        edge(:n - 1) = s%edge(:n - 1)
+        end_outward(:, :, :n - 1) = s%end_outward(:, :, :n - 1)
+        call move_alloc(edge, s%edge)
+        call move_alloc(end_outward, s%end_outward)
+      end if
+      call ensure_capacity(n, s%edge_number)
+      s%edge_at(e) = n
+      s%edge_number(n) = e
+      do m = 1, 2
+        call set_plane(bed%point(:, bed%triangle(:, bed%edge(2 + m, e))), normal(:, m), offset)
+      end do
+      s%edge(n) = edge_between(bed%point(:, bed%edge(1:2, e)), normal)
+      s%end_outward(:, :, n) = bed%point_normal(:, bed%edge(1:2, e))
+    end associate
+  end subroutine add_edge
+
+end module bed_surface_m
