@@ -47,7 +47,7 @@ def output_of(path: Path) -> Path:
 def open_run(path: Path) -> Run:
     """The run of a folder or of a case file, with one row at least."""
     run = Run(results_of(path))
-    if not run.bodies.time.size:
+    if not (run.bodies.time.size and run.series.time.size):
         raise BadRun(f"{run.folder} holds no row of results yet")
     return run
 

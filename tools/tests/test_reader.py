@@ -255,6 +255,17 @@ KINDS: dict[str, Damage] = {
     "a time that is none": put("bodies/time", np.full(11, np.nan)),
     "a time beyond all": put("bodies/time", np.linspace(0, 1e300, 11)),
     "no cells": put("grid/x", [0.0]),
+    "a cell that reaches far": put("grid/z", [*np.linspace(0, 0.2, 41)[:-1], 1e15]),
+    "cells like threads": put("grid/x", np.linspace(0, 1e12, 61)),
+    "cells of nothing": lambda h5: [put(f"grid/{d}", [0.0, 1e-30])(h5) for d in "xyz"],
+    "a corner far away": put("shapes/hexapod/points", np.full((135, 3), 1e15)),
+    "a triangle of one corner": put("shapes/hexapod/triangles", np.zeros((9, 3), int)),
+    "corners in one place": put("shapes/hexapod/points", np.full((135, 3), 1e-3)),
+    "a block of dust": put("shapes/hexapod/sphere_radius", np.full(192, 1e9)),
+    "no volume": lambda h5: h5["shapes/hexapod"].attrs.modify("volume", -1e15),
+    "a density beyond all": lambda h5: h5["shapes/hexapod"].attrs.modify("density", 1e30),
+    "masses below nothing": put("bodies/mass", np.full(9, -1.0)),
+    "a block far away": put("bodies/position", np.full((11, 9, 3), 1e15)),
     "a provenance of nothing": lambda h5: (drop("provenance")(h5), h5.create_group("provenance")),
     "a corner without a place": put("shapes/hexapod/points", np.full((8, 3), np.nan)),
     "a corner that is not there": put("shapes/hexapod/triangles", [[0, 1, 10**6]]),
@@ -310,6 +321,14 @@ def test_a_report_of_no_numbers_is_one_line(broken: Path, name: str, capsys) -> 
     with pytest.raises(SystemExit):
         cli.main(["report", str(broken)])
     assert f"run.h5: bodies/{name} holds what is no number" in capsys.readouterr().err
+
+
+def test_a_column_without_rows_is_one_line(broken: Path, capsys) -> None:
+    with h5py.File(broken / "run.h5", "r+") as h5:
+        put("series/wall_time", np.empty(0))(h5)
+    with pytest.raises(SystemExit):
+        cli.main(["report", str(broken)])
+    assert capsys.readouterr().err.endswith("run holds no row of results yet\n")
 
 
 def test_blocks_as_a_table(loose_pile: Run) -> None:

@@ -3,6 +3,7 @@ edited, checked, run and reported, all in a browser."""
 
 import asyncio
 import fcntl
+import html
 import json
 import os
 import re
@@ -579,6 +580,47 @@ def test_one_run_at_a_time(case: Path) -> None:
         assert request(again, "/watch")[0] == 200 and run(again) == 422
         assert post(again, "/stop", how="now")[0] == 200
         until(lambda: living.holder(lock) is None)
+
+
+@needs_mics
+def test_a_studio_begun_anew_goes_on(case: Path) -> None:
+    """It finds the run that another one began, stops it and goes on with it, from any folder."""
+    folder = case.parent / "mics-here"
+    case.write_text(CASE.replace("mics-here", str(folder)))
+    with serving(site := studio.site_of(case, MICS)):
+        assert post(site, "/run", number=0)[0] == 200
+        until(lambda: (folder / "run.h5").is_file() and Run(folder).bodies.time.size)
+    os.chdir(case.parent.parent)
+    with serving(site := studio.site_of(case, MICS)):
+        assert 'href="/watch"' in request(site, "/")[2]
+        assert json.loads(request(site, "/live")[2])["running"]
+        assert post(site, "/stop", how="restart")[0] == 200
+        until(lambda: living.holder(folder / "run.lock") is None)
+    with serving(site := studio.site_of(case, MICS)):
+        assert "Stopped at t" in json.loads(request(site, "/live")[2])["parts"]["state"]
+        assert post(site, "/go-on")[0] == 200
+        until(lambda: living.holder(folder / "run.lock"))
+        assert post(site, "/run", number=0)[0] == 422
+        assert post(site, "/stop", how="now")[0] == 200
+
+
+ODD = ["two words", "it's", 'a "b"', "a;touch b", "$(touch b)", "`touch b`", "a&b", "<b>", "ä\\n"]
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_the_words_to_go_on_can_be_pasted(name: str, tmp_path: Path) -> None:
+    folder = write_run(tmp_path / name, Motion(t_end=0.1))
+    (folder / "restart-a.h5").touch()
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        h5["provenance"].attrs["exit_status"] = 143
+    shown = str(watch.Watched(folder).parts()["parts"]["state"])
+    (words,) = re.findall("<code>(.*)</code>", shown)
+    assert "<" not in words
+    said = subprocess.run(
+        ["sh", "-c", "printf '%s\\n' " + html.unescape(words)], capture_output=True, text=True
+    )
+    wanted = ["mics-tools", "run", "CASE", "--restart", str(folder / "restart-a.h5")]
+    assert said.stdout == "".join(f"{word}\n" for word in wanted)
 
 
 @needs_mics

@@ -3,6 +3,7 @@
 import argparse
 import json
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -128,9 +129,9 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
 
 
 def known(value: Any) -> Any:
-    """The same without nan, which JSON has not."""
+    """The same without nan and infinite numbers, which JSON has not."""
     if isinstance(value, dict):
         return {k: known(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
         return [known(v) for v in value]
-    return None if value != value else value
+    return None if isinstance(value, float) and not isfinite(value) else value

@@ -28,7 +28,7 @@ from micstools.reading.profiles import along_line
 from micstools.reading.result_file import BadRun as BadRun
 from micstools.reading.result_file import finite, indices, numbers, require_shape, rising, take
 from micstools.reading.schema import require_types, variables
-from micstools.shapes.geometry import Array, IntArray, place
+from micstools.shapes.geometry import Array, IntArray, place, tet_volumes
 from micstools.shapes.shape import Shape
 
 if TYPE_CHECKING:
@@ -439,7 +439,25 @@ def _read_grid(h5: h5py.File) -> Grid:
     faces = [rising(numbers(h5["grid"], d, None), f"grid/{d}", strictly=True) for d in "xyz"]
     if min(map(len, faces)) < 2:
         raise ValueError("grid has no cell")
+    steps = [np.diff(face) for face in faces]
+    if max(step.max() / step.min() for step in steps) > 1.01:
+        raise ValueError("cells of grid differ")
+    edges = [step.mean() for step in steps]
+    if max(edges) > _FAR * min(edges) or max(edges) < 1 / _HUGE:
+        raise ValueError(f"cells of grid of {' x '.join(f'{edge:g}' for edge in edges)} m")
     return Grid(*faces)
+
+
+_HUGE = 1e12  # m, and kg/m3: nothing is as large
+_FAR = 1e5  # tanks: nothing is as far away, or as small beside one
+
+
+def _require_size(values: Any, name: str, h5: h5py.File, far: float = 10.0) -> None:
+    """Refuse lengths from something in the tank beyond `far` times its diagonal, where tools would
+    look at each cell on the way; missing ones pass."""
+    grid = _read_grid(h5)
+    if (np.abs(values) > far * np.linalg.norm(grid.high - grid.low)).any():
+        raise ValueError(f"{name} lies far outside of the tank")
 
 
 def _text(value: Any) -> str:
@@ -447,29 +465,45 @@ def _text(value: Any) -> str:
 
 
 def _read_shapes(h5: h5py.File) -> dict[str, Shape]:
-    return {name: _read_shape(name, group) for name, group in h5.get("shapes", {}).items()}
+    shapes = {name: _read_shape(name, group) for name, group in h5.get("shapes", {}).items()}
+    for name, shape in shapes.items():
+        tank, reach = _read_grid(h5), np.abs(shape.points).max(initial=0.0)
+        _require_size(shape.points, f"shape {name}", h5)
+        _require_size(np.abs(shape.sphere_centre).T + shape.sphere_radius, f"shape {name}", h5)
+        if shape.points.size and reach * _FAR < (tank.high - tank.low).max():
+            raise ValueError(f"shape {name} of {reach:g} m is nothing in the tank")
+    return shapes
 
 
 def _read_shape(name: str, group: h5py.Group) -> Shape:
     points = finite(numbers(group, "points", None, 3), f"shape {name}")
-    centres = numbers(group, "sphere_centre", None, 3)
-    return Shape(
+    centres = finite(numbers(group, "sphere_centre", None, 3), f"shape {name}")
+    shape = Shape(
         name=name,
         points=points,
         triangles=indices(numbers(group, "triangles", None, 3), "triangles", len(points)),
         tets=indices(numbers(group, "tets", None, 4), "tets", len(points)),
         sphere_centre=centres,
-        sphere_radius=numbers(group, "sphere_radius", len(centres)),
+        sphere_radius=finite(numbers(group, "sphere_radius", len(centres)), f"shape {name}"),
         volume=float(_plain(group.attrs["volume"])),
-        inertia=np.asarray(group.attrs["inertia"]).reshape(3, 3),
+        inertia=finite(np.asarray(group.attrs["inertia"]).reshape(3, 3), f"shape {name}"),
         density=float(_plain(group.attrs["density"])),
     )
+    if not (0 < shape.volume < _HUGE and 0 < shape.density < _HUGE):
+        raise ValueError(f"shape {name} has no mass")
+    if not (tet_volumes(points[shape.tets]) > 0).all():
+        raise ValueError(f"a tetrahedron of shape {name} has no volume")
+    a, b, c = np.swapaxes(points[shape.triangles], 0, 1)
+    if not np.cross(b - a, c - a).any(axis=1).all():
+        raise ValueError(f"a triangle of shape {name} has no area")
+    return shape
 
 
 def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
     if "bed" not in h5:
         return np.empty((0, 3)), np.empty((0, 3), dtype=int)
     points = finite(numbers(h5["bed"], "points", None, 3), "bed")
+    _require_size(points - _read_grid(h5).low, "bed", h5, _FAR)
     return points, indices(numbers(h5["bed"], "triangles", None, 3), "bed", len(points))
 
 
@@ -479,8 +513,10 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     group = h5["bodies"]
     per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED, *_KEPT)
     rows = [f.name for f in fields(Bodies) if f.name not in (*per_body, "contact_force_max")]
-    mass = numbers(group, "mass", None)
+    mass = finite(numbers(group, "mass", None), "mass")
     n = len(mass)
+    if not (mass > 0).all():
+        raise ValueError("mass of a body is not positive")
     for name in rows:
         parts = {"quaternion": (n, 4), "time": (), "contacts": (n,), "on_floor": (n,)}
         require_shape(group, name, None, *parts.get(name, (n, 3)))
@@ -488,6 +524,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     step = -(-complete // most) if most else 1
     values = {name: _thinned(group[name], complete, step) for name in rows}
     rising(values["time"], "time")
+    _require_size(values["position"] - _read_grid(h5).low, "position", h5, _FAR)
     shape = [_text(name) for name in group["shape"][:]]
     names = [_text(name) for name in group.get("name", [""] * n)]
     if len(shape) != n or len(names) != n or not set(shape) <= set(h5.get("shapes", {})):
