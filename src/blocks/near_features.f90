@@ -78,7 +78,7 @@ module near_features_m
   end type search_t
 
   real(wp), parameter :: max_skin = 4.0_wp      !! largest skin over the least
-  real(wp), parameter :: ready_share = 0.25_wp  !! way for which the bed is made ready, over a radius
+  real(wp), parameter :: ready_share = 0.25_wp  !! way for which a bed is made ready, over a radius
 
 contains
 
@@ -120,7 +120,7 @@ contains
       if (any(x - reach < near%ready(:, 1)) .or. any(x + reach > near%ready(:, 2))) then
         near%ready(:, 1) = x - reach - ready_share*surface%bounding_radius
         near%ready(:, 2) = x + reach + ready_share*surface%bounding_radius
-        call make_ready(near%ready(:, 1), near%ready(:, 2), bed, search%found)
+        call make_ready(near%ready(:, 1), near%ready(:, 2), bed, search%found, .true.)
       end if
     end associate
     call list_vertices(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
@@ -134,7 +134,8 @@ contains
         distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
       reach = abs(distance) + 2*(near%valid + search%ahead)
-      if (distance < -margin) call make_ready(place - reach, place + reach, bed, search%found)
+      if (distance < -margin) call make_ready(place - reach, place + reach, bed, search%found, &
+        .true.)
       call append_near(bed%surface, i, place, reach, search, near%of_a)
       near%of_a%away(near%of_a%n) = distance - surface%ball
     end do

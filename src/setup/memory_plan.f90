@@ -3,8 +3,8 @@
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
 !! and both couplings (gfortran 12): 550 to 820 B for a cell, those of the halo counted, 1240 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
-!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell. Beds: maps of 300**2
-!! and 600**2 heights, even, wavy and rough; each process has its own.
+!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell. Beds: maps of 400**2
+!! and 1000**2 heights; each process has its own.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp, i8
@@ -38,7 +38,6 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
     integer(i8) :: bytes
-    real(wp), parameter :: reach = 1.5_wp   ! of what is made of a bed, over the radius of a block
     integer(i8) :: each, blocks, features(2)
     real(wp) :: share
     integer :: s
@@ -58,7 +57,7 @@ contains
     if (.not. bed%there) return
     features = [size(bed%triangle, 2), size(bed%edge, 2)]
     share = 0.0_wp   ! of the bed that blocks come near, where they fall beside one another
-    if (blocks > 0) share = min(1.0_wp, real(blocks, wp)*(2*reach*maxval(shapes%radius))**2 &
+    if (blocks > 0) share = min(1.0_wp, real(blocks, wp)*(3*maxval(shapes%radius))**2 &
       /product(bed%surface%high(:2) - bed%surface%low(:2)))
     bytes = bytes + max(0_i8, nproc()*(sum(bytes_of_bed*features) - bytes_left &
       + int(share*sum(bytes_at_blocks*features), i8)))

@@ -13,16 +13,16 @@ module bed_m
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
   use polygon_m, only: clip_polygon
-  use neighbours_m, only: bins_t, bins_of_sets
+  use neighbours_m, only: bins_t, bins_build
   use surface_features_m, only: set_plane
   use surface_search_m, only: found_t, nearest_on_surface, nowhere
-  use bed_surface_m, only: bed_t, make_bed_surface, make_facets, make_edges
+  use bed_surface_m, only: bed_t, make_bed_surface, make_ready
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
   private
   public :: bed_t, make_bed, set_bed, bed_counterpart, bed_place, bed_covers, bed_distance, &
     bed_is_near
-  public :: facet_within, max_clip_corners, way_of, height_of
+  public :: facet_within, max_clip_corners
 
   integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
@@ -146,7 +146,7 @@ contains
     call make_bed_surface(sqrt(area/real(n, wp)), bed)
     within = near_tank(case)
     within(3, :) = 0.0_wp
-    call bins_of_sets(bed%point, bed%triangle, mean_spacing(bed, within), bed%columns, &
+    call bins_build(bed%point, bed%triangle, mean_spacing(bed, within), bed%columns, &
       within=within)
     bed%there = .true.
   end subroutine set_bed
@@ -196,7 +196,7 @@ contains
 
     near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
     n = size(bed%point, 2)
-    call bins_of_sets(bed%point, reshape([(i, i=1, n)], [1, n]), &
+    call bins_build(bed%point, reshape([(i, i=1, n)], [1, n]), &
       mean_spacing(bed, near_tank(case)), bins, near, near_tank(case))
     allocate (number(n), source=0)
     n = 0
@@ -485,8 +485,7 @@ contains
 
     cutoff = near
     do
-      call make_facets(x - cutoff, x + cutoff, bed, found%facets)
-      call make_edges(x - cutoff, x + cutoff, bed, found%edges)
+      call make_ready(x - cutoff, x + cutoff, bed, found)
       call nearest_on_surface(bed%surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
       if (abs(distance) <= cutoff) return

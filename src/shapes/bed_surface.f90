@@ -6,14 +6,14 @@ module bed_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norms
-  use neighbours_m, only: bins_t, bins_of_sets
+  use neighbours_m, only: bins_t, bins_build
   use edge_crossing_m, only: edge_t
   use surface_features_m, only: pair_edges, set_plane, set_facet, edge_between, bend_of, &
     angles_of, find_corners
   use surface_search_m, only: surface_t, near_list_t, found_t, gather
   implicit none
   private
-  public :: bed_t, make_bed_surface, make_facets, make_edges, make_ready
+  public :: bed_t, make_bed_surface, make_edges, make_ready
 
   real(wp), parameter :: no_gap = 1.0e-13_wp     !! by which facets overlap, over the bed [-]
 
@@ -25,9 +25,7 @@ module bed_surface_m
     real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
     type(surface_t) :: surface                 !! what touches and is touched, as far as it is made
     integer :: n_made(2) = 0                   !! facets, edges that are
-    integer, allocatable :: edge(:, :)
-      !! (4, e) those that are not flat, convex ones first: start, end, the facet that runs it that
-      !! way, the other
+    integer, allocatable :: edge(:, :)         !! (4, e) of `pair_edges`: not flat, convex ones first
     integer, allocatable :: open_edge(:, :)    !! (2, o) start and end of those of one facet
     real(wp), allocatable :: point_normal(:, :)   !! (3, n) outward, of any length
     type(bins_t) :: columns                    !! the facets seen from above
@@ -109,45 +107,36 @@ contains
         surface%vertex(:, n) = bed%point(:, c)
       end do
       surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
-      call bins_of_sets(surface%vertex, reshape([(c, c=1, n)], [1, n]), spacing, surface%vertices)
-      call bins_of_sets(bed%point, bed%triangle, spacing, surface%facets)
-      call bins_of_sets(bed%point, bed%edge(1:2, :), spacing, surface%edges)
+      call bins_build(surface%vertex, reshape([(c, c=1, n)], [1, n]), spacing, surface%vertices)
+      call bins_build(bed%point, bed%triangle, spacing, surface%facets)
+      call bins_build(bed%point, bed%edge(1:2, :), spacing, surface%edges)
       allocate (surface%facet_at(size(bed%triangle, 2)), surface%edge_at(size(bed%edge, 2)), &
                 source=0)
       allocate (surface%edge(first_edges), surface%end_outward(3, 2, first_edges))
     end associate
   end subroutine set_lists
 
-  !> Make the facets and edges in a box.
-  subroutine make_ready(low, high, bed, found)
-    real(wp), intent(in) :: low(3), high(3)    !! [m]
+  !> Facets and edges whose bins meet a box: make those that are not there yet, and list them.
+  subroutine make_ready(low, high, bed, found, any_order)
+    real(wp), intent(in) :: low(3), high(3)      !! [m]
     type(bed_t), intent(inout) :: bed
-    type(found_t), intent(inout) :: found      !! work
-
-    call make_facets(low, high, bed, found%facets, any_order=.true.)
-    call make_edges(low, high, bed, found%edges, any_order=.true.)
-  end subroutine make_ready
-
-  !> Facets whose bins meet a box: make those that are not there yet, and list them.
-  subroutine make_facets(low, high, bed, list, any_order)
-    real(wp), intent(in) :: low(3), high(3)    !! [m]
-    type(bed_t), intent(inout) :: bed
-    type(near_list_t), intent(inout) :: list   !! their places in the surface
+    type(found_t), intent(inout) :: found        !! their places in the surface
     logical, intent(in), optional :: any_order   !! see `gather`
     integer :: m
 
-    call gather(bed%surface%facets, size(bed%surface%facet_at), low, high, list, any_order)
-    associate (s => bed%surface, f => list%item)
-      do m = 1, list%n
+    call gather(bed%surface%facets, size(bed%surface%facet_at), low, high, found%facets, any_order)
+    associate (s => bed%surface, f => found%facets%item)
+      do m = 1, found%facets%n
         if (s%facet_at(f(m)) == 0) call add_facet(f(m), bed)
         f(m) = s%facet_at(f(m))
       end do
     end associate
-  end subroutine make_facets
+    call make_edges(low, high, bed, found%edges, any_order)
+  end subroutine make_ready
 
-  !> The same for edges.
+  !> The same for edges alone.
   subroutine make_edges(low, high, bed, list, any_order)
-    real(wp), intent(in) :: low(3), high(3)    !! as in `make_facets`
+    real(wp), intent(in) :: low(3), high(3)      !! as in `make_ready`
     type(bed_t), intent(inout) :: bed
     type(near_list_t), intent(inout) :: list
     logical, intent(in), optional :: any_order

@@ -4,7 +4,7 @@ module neighbours_m
   use growing_m, only: ensure_capacity
   implicit none
   private
-  public :: bins_t, bins_build, bins_of_sets, pair_list_t, near_pairs, nearest_shift
+  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
   public :: sort_bodies, add_neighbours
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
@@ -29,10 +29,14 @@ module neighbours_m
     integer, allocatable, private :: cell(:, :), chain(:), head(:)   !! work: linked lists
   end type pair_list_t
 
+  interface bins_build
+    procedure :: bins_of_boxes, bins_of_sets
+  end interface bins_build
+
 contains
 
   !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
-  subroutine bins_build(low, high, size_wanted, bins)
+  subroutine bins_of_boxes(low, high, size_wanted, bins)
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
     real(wp), intent(in) :: size_wanted             !! [m]
     type(bins_t), intent(out) :: bins
@@ -41,7 +45,7 @@ contains
     n = size(low, 2)
     call bins_of_sets(reshape([low, high], [3, 2*n]), reshape([(i, n + i, i=1, n)], [2, n]), &
       size_wanted, bins)
-  end subroutine bins_build
+  end subroutine bins_of_boxes
 
   !> Sort the boxes around sets of points into bins of about the given size.
   !!
@@ -54,8 +58,8 @@ contains
     type(bins_t), intent(out) :: bins
     real(wp), intent(in), optional :: more      !! by which the boxes are larger, default 0 [m]
     real(wp), intent(in), optional :: within(3, 2)
-      !! lower and upper corner of a box to which theirs are moved: bins stay small where there are
-      !! points far away, and find all they should, since the order along each axis is kept [m]
+      !! corners of a box to which theirs are moved: bins stay small where points are far away, and
+      !! find all they should, since the order along each axis is kept [m]
     integer, parameter :: max_bins = 200000
     integer(i8), parameter :: often = 100_i8             !! entries of a box on average
     integer(i8), parameter :: few = 10000000_i8, most = 1000000000_i8   !! entries in all
@@ -86,7 +90,8 @@ contains
       edge = 1.25_wp*edge
     end do
     call set_size(extent, edge, bins)
-    do while (entries(point, set, add, bound, bins) > min(max(few, often*int(size(set, 2), i8)), most))
+    do while (entries(point, set, add, bound, bins) &
+              > min(max(few, often*int(size(set, 2), i8)), most))
       edge = 2*edge
       call set_size(extent, edge, bins)
     end do
