@@ -11,7 +11,7 @@ module overlap_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
-  use bed_surface_m, only: make_edges
+  use bed_surface_m, only: make_ready
   use surface_search_m, only: found_t, search_surface
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
@@ -274,9 +274,9 @@ contains
         depth = max(depth, -distance)
       end do
     end do
-    call make_edges(x - body%radius, x + body%radius, bed, found%edges)
+    call make_ready(x - body%radius, x + body%radius, bed, found, any_order=.true.)
     do m = 1, found%edges%n
-      if (bed%surface%edge_number(found%edges%item(m)) > bed%surface%n_convex) exit
+      if (bed%surface%edge_number(found%edges%item(m)) > bed%surface%n_convex) cycle
       associate (edge => bed%surface%edge(found%edges%item(m)))
         do i = 0, ceiling(edge%extent/body%spacing)
           p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x

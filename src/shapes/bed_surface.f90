@@ -10,10 +10,10 @@ module bed_surface_m
   use edge_crossing_m, only: edge_t
   use surface_features_m, only: pair_edges, set_plane, set_facet, edge_between, bend_of, &
     angles_of, find_corners
-  use surface_search_m, only: surface_t, near_list_t, found_t, gather
+  use surface_search_m, only: surface_t, found_t, gather
   implicit none
   private
-  public :: bed_t, make_bed_surface, make_edges, make_ready
+  public :: bed_t, make_bed_surface, make_ready
 
   real(wp), parameter :: no_gap = 1.0e-13_wp     !! by which facets overlap, over the bed [-]
 
@@ -25,7 +25,7 @@ module bed_surface_m
     real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
     type(surface_t) :: surface                 !! what touches and is touched, as far as it is made
     integer :: n_made(2) = 0                   !! facets, edges that are
-    integer, allocatable :: edge(:, :)         !! (4, e) of `pair_edges`: not flat, convex ones first
+    integer, allocatable :: edge(:, :)         !! (4, e) of `pair_edges`: bent, convex ones first
     integer, allocatable :: open_edge(:, :)    !! (2, o) start and end of those of one facet
     real(wp), allocatable :: point_normal(:, :)   !! (3, n) outward, of any length
     type(bins_t) :: columns                    !! the facets seen from above
@@ -131,25 +131,14 @@ contains
         f(m) = s%facet_at(f(m))
       end do
     end associate
-    call make_edges(low, high, bed, found%edges, any_order)
-  end subroutine make_ready
-
-  !> The same for edges alone.
-  subroutine make_edges(low, high, bed, list, any_order)
-    real(wp), intent(in) :: low(3), high(3)      !! as in `make_ready`
-    type(bed_t), intent(inout) :: bed
-    type(near_list_t), intent(inout) :: list
-    logical, intent(in), optional :: any_order
-    integer :: m
-
-    call gather(bed%surface%edges, size(bed%surface%edge_at), low, high, list, any_order)
-    associate (s => bed%surface, e => list%item)
-      do m = 1, list%n
+    call gather(bed%surface%edges, size(bed%surface%edge_at), low, high, found%edges, any_order)
+    associate (s => bed%surface, e => found%edges%item)
+      do m = 1, found%edges%n
         if (s%edge_at(e(m)) == 0) call add_edge(e(m), bed)
         e(m) = s%edge_at(e(m))
       end do
     end associate
-  end subroutine make_edges
+  end subroutine make_ready
 
   !> Append facet f to the surface.
   subroutine add_facet(f, bed)

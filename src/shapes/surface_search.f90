@@ -65,7 +65,7 @@ contains
   end subroutine gather_vertices
 
   !> Edges whose bins meet a box; the box should not be much smaller than a bin. Those of a bed are
-  !! made before (`make_edges` in `bed_surface_m`).
+  !! made before (`make_ready` in `bed_surface_m`).
   subroutine gather_edges(surface, low, high, list)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: low(3), high(3)   !! [m]
