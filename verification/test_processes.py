@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+from micstools.bench.timing import alone
 from run_cases import CASES, ROOT, Machine, run
 from shared_runs import call
 
@@ -41,21 +42,15 @@ MEMORY_CASE = """&run t_end = 1.0e-3  dt = 1.0e-3  field_interval = 0 /
 &shape name = 'unit'  kind = 'hexapod'  size = 0.02 /
 &body shape = 'unit'  position = 0.06, 0.08, 0.06 /
 """
-MEASURE = """import os, resource, subprocess, sys
-code = subprocess.call(sys.argv[2:])
-peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-open(sys.argv[1] + "." + os.environ["OMPI_COMM_WORLD_RANK"], "w").write(str(peak))
-sys.exit(code)
-"""
 
 
-def peaks(case: Path, ranks: int) -> list[int]:
+def peaks(case: Path, ranks: int) -> list[float]:
     """Most memory that each process held at a time [kB]."""
     own = case.with_suffix(f".memory-{ranks}")
     start = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(ranks)]
     program = [str(PARALLEL), "--quiet", "--output", f"{own}-run", str(case)]
-    call(*start, sys.executable, "-c", MEASURE, own, *program, check=True)
-    return [int(Path(f"{own}.{rank}").read_text()) for rank in range(ranks)]
+    call(*start, *alone(own, *program), check=True)
+    return [float(Path(f"{own}{rank}").read_text().split()[1]) for rank in range(ranks)]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other units of the peak")

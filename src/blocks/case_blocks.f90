@@ -52,7 +52,7 @@ contains
     allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
     allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
     allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
-    allocate (blocks%lagged_force(6, n), source=0.0_wp)
+    allocate (blocks%lagged_force(6, n), blocks%film_force(6, n), source=0.0_wp)
     allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
     do b = 1, size(case%body)
       call put_block(case, place_of_body(case%body(b)), b, blocks)

@@ -30,7 +30,8 @@ module contact_solver_m
     type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
     type(lubrication_t) :: lubrication
     real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
-    real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
+    real(wp), allocatable :: steady(:, :)
+      !! (6, n) force and torque all through the step [N, N m]
     type(loads_t) :: loads
     type(met_t) :: met                           !! pairs that touched in this step
   contains
@@ -77,7 +78,7 @@ contains
     associate (loads => contacts%loads, n => blocks%n)
       allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
         loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), source=0.0_wp)
-      allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
+      allocate (contacts%share(n), contacts%steady(6, n), source=0.0_wp)
     end associate
     call sleep_init(input%sleep, contacts%detected%bounding_radius, contacts%sleep)
     call reserve_displacements(1, contacts%displacements)

@@ -83,8 +83,9 @@ contains
     associate (share => contacts%share)
       do b = 1, blocks%n
         share(b) = blocks%mass(b)/(blocks%mass(b) + blocks%added_mass(b))
-        contacts%steady(:, b) = blocks%fluid_force(:, b) &
+        contacts%steady(1:3, b) = blocks%fluid_force(:, b) - blocks%film_force(1:3, b) &
           + (1.0_wp - share(b))*blocks%contact_force(:, b)
+        contacts%steady(4:6, b) = blocks%fluid_torque(:, b) - blocks%film_force(4:6, b)
       end do
     end associate
     contacts%loads%impulse = 0.0_wp

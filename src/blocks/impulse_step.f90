@@ -122,7 +122,7 @@ contains
         contacts%gain(b) = 0.0_wp
         cycle
       end if
-      contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
+      contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(1:3, b)/blocks%mass(b)), &
                                blocks%fixed(b))*left &
         + haste(blocks, b, contacts%detected%surface%bounding_radius(b))
       speed = fastest(b)
@@ -219,9 +219,9 @@ contains
             end if
             if (rows%inverse_mass(b) <= 0.0_wp) cycle
             by_film = rows%inverse_mass(b)*contacts%film(:, b)
-            rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
+            rows%a_free(1:3, b) = gravity + contacts%steady(1:3, b)/blocks%mass(b) + by_film
             rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), &
-              blocks%fluid_torque(:, b) - cross(blocks%omega(:, b), blocks%l(:, b)))
+              contacts%steady(4:6, b) - cross(blocks%omega(:, b), blocks%l(:, b)))
           end associate
         end do
         call solve_rows(h, max_opening*contacts%smallest_edge/contacts%contact_time, &
@@ -250,12 +250,12 @@ contains
         if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
         if (rows%busy(b) .and. .not. blocks%fixed(b)) then
           call place_body(b, rows%way(:, b), rows%v(1:3, b), &
-            step*(blocks%fluid_torque(:, b) + loads%torque(:, b)), blocks)
+            step*(contacts%steady(4:6, b) + loads%torque(:, b)), blocks)
         else
-          force = contacts%steady(:, b) + contacts%share(b)*contacts%film(:, b)
-          call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)
+          force = contacts%steady(1:3, b) + contacts%share(b)*contacts%film(:, b)
+          call kick_body(gravity, 0.5_wp*step, force, contacts%steady(4:6, b), b, blocks)
           call drift_body(step, b, blocks)
-          call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)
+          call kick_body(gravity, 0.5_wp*step, force, contacts%steady(4:6, b), b, blocks)
         end if
       end do
       loads%impulse = loads%impulse + step*loads%force

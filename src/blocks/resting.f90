@@ -71,11 +71,11 @@ contains
           loads%force(:, b) = loads%force(:, b) + sleep%load(:, b)
           loads%torque(:, b) = loads%torque(:, b) + sleep%load_torque(:, b)
           if (.not. blocks%asleep(b)) cycle
-          other = contacts%steady(:, b) + blocks%mass(b)*gravity
+          other = contacts%steady(1:3, b) + blocks%mass(b)*gravity
           if (balanced(wake_tolerance, loads%force(:, b), loads%torque(:, b), other, &
-                       blocks%fluid_torque(:, b), sleep%bounding_radius(b))) then
+                       contacts%steady(4:6, b), sleep%bounding_radius(b))) then
             loads%force(:, b) = -other
-            loads%torque(:, b) = -blocks%fluid_torque(:, b)
+            loads%torque(:, b) = -contacts%steady(4:6, b)
           else
             call wake(b, blocks)
             woke = .true.
@@ -128,8 +128,8 @@ contains
       do b = 1, blocks%n
         if (.not. (candidate(b) .and. supported(b))) cycle
         if (.not. balanced(rest_tolerance, loads%force(:, b), loads%torque(:, b), &
-                           contacts%steady(:, b) + blocks%mass(b)*gravity, &
-                           blocks%fluid_torque(:, b), contacts%sleep%bounding_radius(b))) cycle
+                           contacts%steady(1:3, b) + blocks%mass(b)*gravity, &
+                           contacts%steady(4:6, b), contacts%sleep%bounding_radius(b))) cycle
         ! should it wake before the step ends, contact has taken this
         loads%impulse(:, b) = loads%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
         loads%twist(:, b) = loads%twist(:, b) - blocks%l(:, b)

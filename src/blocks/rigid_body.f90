@@ -81,8 +81,9 @@ module rigid_body_m
     real(wp), allocatable :: v_start(:, :), l_start(:, :)
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
     real(wp), allocatable :: fluid_force(:, :), fluid_torque(:, :)
-    real(wp), allocatable :: lagged_force(:, :)
-      !! (6, n) force and torque of the fluid that the next step adds (`wall_balance_m`) [N, N m]
+    real(wp), allocatable :: lagged_force(:, :), film_force(:, :)
+      !! (6, n) force and torque of the fluid: what the next step adds (`wall_balance_m`), and what
+      !! of this one does not last, of films (`pressure_extension_m`) [N, N m]
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
     integer, allocatable :: contacts(:)   !! (n) different counterparts touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them

@@ -88,9 +88,9 @@ contains
         associate (v => counterparts%v(:, b), omega => counterparts%omega(:, b))
           if (candidate(b)) v = 0.0_wp
           if (candidate(b)) omega = 0.0_wp
-          v = v + 0.5_wp*contacts%substep*(gravity + contacts%steady(:, b)/blocks%mass(b))
+          v = v + 0.5_wp*contacts%substep*(gravity + contacts%steady(1:3, b)/blocks%mass(b))
           omega = omega + 0.5_wp*contacts%substep &
-            *matmul(counterparts%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+            *matmul(counterparts%inverse_inertia(:, :, b), contacts%steady(4:6, b))
         end associate
       end do
     end associate
@@ -141,8 +141,8 @@ contains
       contacts%support(:, b) = 0.0_wp
       if (.not. blocks%asleep(b)) cycle
       associate (support => contacts%support(:, b), loads => contacts%loads)
-        support(1:3) = -(contacts%steady(:, b) + blocks%mass(b)*gravity)
-        support(4:6) = -blocks%fluid_torque(:, b)
+        support(1:3) = -(contacts%steady(1:3, b) + blocks%mass(b)*gravity)
+        support(4:6) = -contacts%steady(4:6, b)
         loads%impulse(:, b) = loads%impulse(:, b) + dt*support(1:3)
         loads%twist(:, b) = loads%twist(:, b) + dt*support(4:6)
       end associate
@@ -227,7 +227,7 @@ contains
       call integrate_displacements(0.5_wp*dt_b, detected, displacements)
       do k = 1, size(acting)
         associate (b => acting(k))
-          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(1:3, b), contacts%steady(4:6, b), &
                          b, blocks)
         end associate
       end do
@@ -243,7 +243,7 @@ contains
           loads%twist(:, b) = loads%twist(:, b) + dt_b*(loads%torque(:, b) - support(4:6, b))
           call kick_body(none, dt_b, contacts%share(b)*loads%force(:, b), loads%torque(:, b), b, &
                          blocks)
-          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(1:3, b), contacts%steady(4:6, b), &
                          b, blocks)
           ! sleepers had the velocity of the middle of the substep, and have none at its end
           if (blocks%asleep(b)) call put_to_sleep(b, blocks)

@@ -47,6 +47,8 @@ module coupling_m
     type(fluid_t) :: fluid
     real(wp) :: dt_release = 0.0_wp                !! in which a block begins to move [s]
     type(rigid_motion_t) :: bodies
+    type(rigid_motion_t) :: expected
+      !! the motion at the end of the step with the forces of the fluid in the last one
     type(rigid_motion_t) :: at_start
       !! the same with the motion at the start of the step
     type(viscous_t) :: viscous
@@ -132,6 +134,7 @@ contains
     self%dt_release = case%run%dt
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
+    call rigid_motion_init(n, self%expected)
     call viscous_init(grid, n, self%viscous, pooled=.true.)
     select case (case%numerics%momentum)
     case ('c_ismac'); self%implicit_momentum = .true.
@@ -158,6 +161,7 @@ contains
     self%total = 0.0_wp
     self%force = 0.0_wp
     self%force(:, :blocks%n, left_by_walls) = blocks%lagged_force
+    call copy_motion(blocks, self%expected)
     call motion_after_fluid(gravity, dt, blocks, self)
     self%unforced_motion = self%bodies%motion
     self%at_start = self%bodies

@@ -45,7 +45,7 @@ contains
       flow%uf = s%dt*a%face
       call solve_pressure(s, flow%rho, held, p)
       converged = converged .and. p%report%converged
-      call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, p)
+      call extend_pressure(grid, self%fluid%gravity, solid, flow, p)
       flow%uf = uf
       call all_fluid_of_faces(grid, solid, self%bodies, system%operator%flux, flow%uf, &
                               flow%solid_flux)

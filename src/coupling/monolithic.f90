@@ -61,6 +61,8 @@ module monolithic_m
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: held(:, :, :)           !! (6, 3, n) fluid held at faces
     real(wp), allocatable :: held_motion(:, :)     !! (6, n) motion that held fluid has got
+    real(wp), allocatable :: of_films(:, :)
+      !! (6, n) force of what the pressure of films differs by from that around them [N, N m]
     real(wp), allocatable :: left_over(:, :)       !! (6, n) force of the walls for the next step
     real(wp), allocatable :: correction(:, :, :, :)
       !! of the faces at the start of the step (`old_time_correction_m`) [m/s]
@@ -94,7 +96,7 @@ contains
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
     allocate (self%defect(6, 3, n), self%held(6, 3, n), source=0.0_wp)
-    allocate (self%held_motion, self%left_over, self%extrapolated, source=self%total)
+    allocate (self%held_motion, self%left_over, self%of_films, self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     if (self%implicit_momentum) return
     allocate (self%kick(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
@@ -120,9 +122,9 @@ contains
       end if
       if (.not. self%bodies%free(b)) cycle
       self%extrapolated(1:3, b) = s%dt*(self%fluid%gravity + (blocks%fluid_force(:, b) &
-                                                 + blocks%contact_force(:, b))/blocks%mass(b))
+        - blocks%film_force(1:3, b) + blocks%contact_force(:, b))/blocks%mass(b))
       self%extrapolated(4:6, b) = s%dt*matmul(self%bodies%inverse_inertia(:, :, b), &
-                                    blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
+        blocks%fluid_torque(:, b) - blocks%film_force(4:6, b) + blocks%contact_torque(:, b))
     end do
     ! the merged cells of the end of the last step, or new ones if blocks have come
     call move_alloc(self%merged_before, keep)
@@ -249,13 +251,16 @@ contains
                viscous => self%viscous, merged => self%merged, balance => self%balance)
       call fill_velocity_halo(grid, u)
       call store_velocity(grid, merged, u, balance%before)
+      ! The wall as contact leaves it, with the fluid forces of the last step: one that stops drags
+      ! the centres near it to rest, and seen from it as it was the mean would turn back by 1/T_c;
+      ! without those forces a sphere in a narrow tube never falls steadily.
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, self%at_start, u, merged)
-        call to_centres(grid, merged, self%at_start, u)
+        call find_centres(grid, solid, self%expected, u, merged)
+        call to_centres(grid, merged, self%expected, u)
       end if
       call build_viscous(grid, solid, bodies, self%rho, s%flow%mu, s%dt, viscous, merged)
       call predict_velocity(s, self%rho, self)
-      call to_centres(grid, merged, self%at_start, u, back=.true.)
+      call to_centres(grid, merged, self%expected, u, back=.true.)
       call fill_velocity_halo(grid, u, layers=1)
       call follow_targets(grid, merged, balance%mass, balance%before, u, balance%to_wall)
       self%force(:, :, by_viscosity) = viscous%force
@@ -300,7 +305,7 @@ contains
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     type(coupling_report_t), intent(inout) :: report
-    real(wp) :: of_walls(6, self%bodies%n)
+    real(wp), dimension(6, self%bodies%n) :: of_walls, without
     integer :: b
 
     associate (bodies => self%bodies, pressure => self%pressure)
@@ -322,7 +327,10 @@ contains
       end if
       call impose_rigid_velocity(s%grid, s%solid, self%merged, bodies, s%flow%u)
       call fill_velocity_halo(s%grid, s%flow%u)
-      call extend_pressure(s%grid, self%fluid%gravity, s%solid%alpha, s%flow, pressure)
+      call force_from_faces(s%grid, bodies, pressure%system%operator%flux, s%flow%p, self%of_films)
+      call extend_pressure(s%grid, self%fluid%gravity, s%solid, s%flow, pressure)
+      call force_from_faces(s%grid, bodies, pressure%system%operator%flux, s%flow%p, without)
+      self%of_films = self%of_films - without
       self%total = sum(self%force, 3)
       do b = 1, bodies%n   ! the displaced fluid resists the acceleration that the solve has found
         if (bodies%free(b)) self%total(:, b) = self%total(:, b) &
@@ -376,6 +384,7 @@ contains
     associate (unused => report)
     end associate
     blocks%lagged_force = self%left_over(:, :blocks%n)
+    blocks%film_force = self%of_films(:, :blocks%n)
     call all_fluid_of_faces(s%grid, s%solid, self%bodies, self%pressure%system%operator%flux, &
                             s%flow%uf, s%flow%solid_flux)
   end subroutine close_faces
@@ -454,7 +463,7 @@ contains
         force(1:3, b) = bodies%mass(b)*(a(1:3) - self%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
       end do
-      call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, self%pressure)
+      call extend_pressure(grid, self%fluid%gravity, solid, flow, self%pressure)
       self%bodies = moving
       call move_alloc(uf, s%flow%uf)
       call move_alloc(solid_flux, s%flow%solid_flux)

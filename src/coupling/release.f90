@@ -254,6 +254,7 @@ contains
       blocks%fluid_force(:, b) = 0.0_wp
       blocks%fluid_torque(:, b) = 0.0_wp
       blocks%lagged_force(:, b) = 0.0_wp
+      blocks%film_force(:, b) = 0.0_wp
       if (is_root()) write (error_unit, '(a)') 'mics: t = '//brief(time, 6)//' s: ' &
         //body_text(b, blocks)//' is out: it passed an open side at ('//to_text(blocks%x(:, b)) &
         //') m with '//brief(norm(blocks%v(:, b)))//' m/s'

@@ -109,6 +109,7 @@ contains
     call list%add('/blocks/fluid_force', 'N', blocks%fluid_force)
     call list%add('/blocks/fluid_torque', 'N m', blocks%fluid_torque)
     call list%add('/blocks/lagged_force', 'N, N m', blocks%lagged_force)
+    call list%add('/blocks/film_force', 'N, N m', blocks%film_force)
     call list%add('/blocks/contact_force', 'N', blocks%contact_force)
     call list%add('/blocks/contact_torque', 'N m', blocks%contact_torque)
     call list%add('/blocks/contacts', blocks%contacts)

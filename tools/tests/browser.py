@@ -13,6 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from calls import NotYet
+
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 PROGRAM = next((path for name in PROGRAMS if (path := shutil.which(name))), None)
 PATIENCE = 60  # [s]
@@ -95,7 +97,8 @@ class Browser:
             answer = self._next()
             if answer.get("id") == self.number:
                 if "error" in answer:
-                    raise RuntimeError(f"{method}: {answer['error']}")
+                    error = NotYet if "navigated" in str(answer["error"]) else RuntimeError
+                    raise error(f"{method}: {answer['error']}")
                 return answer.get("result", {})
             kind, said = answer.get("method", ""), answer.get("params", {})
             if kind == "Runtime.exceptionThrown":

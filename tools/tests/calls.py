@@ -1,5 +1,6 @@
 """Commands and programs as a user calls them, and stand-ins for programs."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -40,13 +41,19 @@ def plan_of(folder: Path, case: str) -> str:
     return done.stdout
 
 
+class NotYet(RuntimeError):
+    """A page that is being left has no answer."""
+
+
 def until(work: Callable[[], Any], patience: float = 120.0) -> Any:
     """The first answer that is true."""
     end = time.monotonic() + patience
-    while not (found := work()):
-        assert time.monotonic() < end, "it does not come"
+    while time.monotonic() < end:
+        with contextlib.suppress(NotYet):
+            if found := work():
+                return found
         time.sleep(0.05)
-    return found
+    raise AssertionError("it does not come")
 
 
 def program(path: Path, text: str) -> Path:

@@ -7,6 +7,7 @@ import numpy as np
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, below_plane
+from worlds import draw
 from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
@@ -53,6 +54,40 @@ def honey() -> World:
                        "water_level": 0.02287795, "velocity": [0.0, 1e-6, 1e-6]}),
         ]
     )  # fmt: skip
+
+
+def landing() -> World:
+    """A sphere that lands on the floor in thick oil and presses out what is below it."""
+    sphere = {"shape": "s", "position": [0.064211, 0.0554631, 0.0628113],
+              "velocity": [-0.197358, -0.116621, -0.0448541], "quaternion": [9.0, 6.0, 6.0, 0.0],
+              "angular_velocity": [-4.48638785, 2.08296579, 2.40342206]}  # fmt: skip
+    return World(
+        [
+            ("run", {"t_end": 0.2, "dt": 0.01, "field_interval": 0.0, "restart_interval": 0.0}),
+            ("grid", {"cells": [11, 7, 14], "length": [0.239931, 0.114717, 0.23406]}),
+            ("boundary", draw.ALONG_X),
+            ("fluid", {"liquid_density": 700.0, "liquid_viscosity": 0.56234, "gas_density": 0.84,
+                       "water_level": 0.11703}),
+            ("contact", {"solver": "springs", "contact_time": 2.8e-3, "restitution": 0.275}),
+            ("shape", {"name": "s", "kind": "sphere", "size": 0.093313, "density": 2492.8,
+                       "refinement": 1}),
+            ("body", sphere),
+        ]
+    )  # fmt: skip
+
+
+def lying_cube(quaternion: list[float], solver: str) -> World:
+    """A cube of 1 m that sinks onto the floor, cells of .2 m, from .3 m above it."""
+    return World(
+        [
+            ("run", {"t_end": 2.0, "dt": 0.01, "field_interval": 0.0, "restart_interval": 0.0}),
+            ("grid", {"cells": [15, 15, 12], "length": [3.0, 3.0, 2.4]}),
+            ("fluid", {"water_level": 2.1}),
+            ("contact", {"solver": solver}),
+            ("shape", {"name": "c", "kind": "cube", "size": 1.0, "density": 2300.0}),
+            ("body", {"shape": "c", "position": [1.53, 1.47, 0.8], "quaternion": quaternion}),
+        ]
+    )
 
 
 def motion(world: World, run: Run) -> Array:

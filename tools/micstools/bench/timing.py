@@ -35,18 +35,19 @@ def mpirun(ranks: int) -> list[str]:
     return words if ranks > 1 else []
 
 
-ALONE = """import resource, subprocess, sys
-code = subprocess.call(sys.argv[2:])
+ALONE = """import os, resource, subprocess, sys
+code, told = subprocess.call(sys.argv[2:]), sys.argv[1]
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
-with open(sys.argv[1], "w") as told:
-    print(used.ru_utime + used.ru_stime, used.ru_maxrss, file=told)
+with open(told + os.environ.get("OMPI_COMM_WORLD_RANK", ""), "w") as file:
+    print(used.ru_utime + used.ru_stime, used.ru_maxrss, file=file)
 sys.exit(code)
 """
 
 
 def alone(told: Path, *words: object) -> list[str]:
     """A command by a small Python, which writes the CPU seconds and the largest memory [kB] into a
-    file. Linux counts what the calling process holds as taken by what it starts."""
+    file; its name ends with the rank. Linux counts what the calling process holds as taken by what
+    it starts."""
     return [sys.executable, "-I", "-S", "-c", ALONE, *map(str, (told, *words))]
 
 
@@ -67,11 +68,11 @@ def timed(
             text=True,
         )
         wall = time.perf_counter() - began
-        cpu, memory = map(float, told.read().split())
+        used = [float(word) for word in told.read().split()]
     if done.returncode and not (excused and excused in done.stdout):
         last = done.stdout.strip().splitlines()[-1:] or ["nothing said"]
         raise subprocess.SubprocessError(f"{words[0]} ended with {done.returncode}: {last[0]}")
-    return wall, cpu, memory if sys.platform == "darwin" else 1024 * memory
+    return wall, used[0], used[1] * (1 if sys.platform == "darwin" else 1024)
 
 
 def processor() -> str:

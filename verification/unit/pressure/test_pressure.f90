@@ -310,7 +310,8 @@ contains
     end associate
   end subroutine accelerations_at_faces
 
-  !> Cells that cannot move take the pressure of their height; under a closed floor, from above.
+  !> Cells that cannot move take the pressure of their height; under a closed floor, from above. So
+  !! do films, but not cells with one face that is open.
   subroutine closed_cells()
     real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp]
     real(wp) :: worst
@@ -327,7 +328,18 @@ contains
     where (.not. pressure%system%active) box%flow%p = 1.0e9_wp
     box%solid%alpha(9, 4:6, 5) = 0.99_wp   ! next to no water
     box%flow%p(9, 4:6, 5) = 5.0e4_wp
-    call extend_pressure(box%grid, g, box%solid%alpha, box%flow, pressure)
+    box%solid%cut_cell(:, 1) = [1, 2, 6]
+    box%solid%cut_cell(:, 2) = [11, 2, 6]
+    box%flow%p([1, 11], 2, 6) = 7.0e4_wp
+    box%solid%aperture(2, 2, 6, 1) = 0.009_wp   ! of the cell in the corner of two walls
+    box%solid%aperture(1, 2:3, 6, 2) = 0.009_wp
+    box%solid%aperture(1, 2, 6:7, 3) = 0.009_wp
+    box%solid%aperture(11:12, 2, 6, 1) = 0.009_wp
+    box%solid%aperture(11, 2:3, 6, 2) = [0.009_wp, 0.011_wp]
+    box%solid%aperture(11, 2, 6:7, 3) = 0.009_wp
+    call extend_pressure(box%grid, g, box%solid, box%flow, pressure)
+    call check('films: open at one side', box%flow%p(11, 2, 6), 7.0e4_wp)
+    box%flow%p(11, 2, 6) = hydrostatic(6)
     call check('closed cells: next to no water keeps its pressure', box%flow%p(9, 5, 5), 5.0e4_wp)
     box%flow%p(9, 4:6, 5) = hydrostatic(5)
     worst = 0.0_wp
