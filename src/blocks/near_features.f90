@@ -7,7 +7,7 @@ module near_features_m
   use vectors_m, only: cross, norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
   use bed_surface_m, only: make_ready
-  use surface_search_m, only: surface_t, near_list_t, found_t, gather_vertices, gather_edges, &
+  use surface_search_m, only: surface_t, near_list_t, found_t, gather, gather_edges, &
     gather_facets, search_surface, min_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   implicit none
@@ -180,7 +180,7 @@ contains
     if (host%ball > 0.0_wp) return   ! its own centre is the vertex
     margin = skin + search%ahead + guest%ball
     call box_in_view(inverse_view(guest_in_host), host%low - margin, host%high + margin, low, high)
-    call gather_vertices(guest, low, high, search%guests)
+    call gather(guest%vertices, size(guest%weight), low, high, search%guests)
     do m = 1, search%guests%n
       place = seen_from(guest_in_host, guest%vertex(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle

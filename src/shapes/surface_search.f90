@@ -10,7 +10,7 @@ module surface_search_m
   use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_t, near_list_t, found_t, gather, gather_vertices, gather_edges, gather_facets
+  public :: surface_t, near_list_t, found_t, gather, gather_edges, gather_facets
   public :: nearest_on_surface, search_surface, min_distance, segment_distance2, nowhere
 
   type :: surface_t
@@ -54,15 +54,6 @@ module surface_search_m
   real(wp), parameter :: nowhere = 1.0e30_wp   !! distance from nothing [m]
 
 contains
-
-  !> Vertices inside a box.
-  subroutine gather_vertices(surface, low, high, list)
-    type(surface_t), intent(in) :: surface
-    real(wp), intent(in) :: low(3), high(3)   !! [m]
-    type(near_list_t), intent(inout) :: list
-
-    call gather(surface%vertices, size(surface%weight), low, high, list)
-  end subroutine gather_vertices
 
   !> Edges whose bins meet a box; the box should not be much smaller than a bin. Those of a bed are
   !! made before (`make_ready` in `bed_surface_m`).

@@ -278,6 +278,29 @@ def test_points_in_units_of_their_names(
         height_maps.load(save(tmp_path / "b.xyz", "x [m] y [m] z [fathom]\n0 0 1\n"))
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        "z,y,x\n{z},0,0\n{z},0,1\n{z},1,0\n-5,1,1",
+        "ID;North (cm);East (cm);Depth (cm)\na;0;0;100\nb;0;100;100\nc;100;0;100\nd;100;100;500",
+        "Elevation North East time\n{z} 0 0 9:00\n{z} 0 1 9:01\n{z} 1 0 9:02\n-5 1 1 9:03",
+        "e\tn\tWater depth\n0\t0\t-1\n1\t0\t-1\n0\t1\t-1\n1\t1\t-5",
+    ],
+)
+def test_columns_mean_what_their_names_say(table: str, tmp_path: Path) -> None:
+    found = height_maps.load(save(tmp_path / "a.csv", table.format(z=-1)))
+    assert found.z.tolist() == [[-1.0, -1.0], [-1.0, -5.0]]
+    assert ("depths, which count down" in found.remarks) == ("Depth" in table)
+    for head in ("x y sand", "x x y z", "survey of stones"):
+        with pytest.raises(BadRun, match="columns must be named"):
+            height_maps.load(save(tmp_path / "b.csv", head + "\n0 0 1\n"))
+
+
+def test_a_unit_in_a_remark_is_told(tmp_path: Path) -> None:
+    found = height_maps.load(save(tmp_path / "a.xyz", "# in feet\n0 0 1\n0 1 1\n1 0 1\n1 1 1"))
+    assert any("a remark speaks of feet" in told for told in found.remarks)
+
+
 def test_doubled_soundings_and_gaps_are_told(tmp_path: Path) -> None:
     """The order of lines does not decide, and a hole of 10 m in soundings 1 m apart stays one."""
     x, y = (c.ravel() for c in np.meshgrid(np.arange(41.0), np.arange(31.0)))

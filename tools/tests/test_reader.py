@@ -323,6 +323,13 @@ def test_a_report_of_no_numbers_is_one_line(broken: Path, name: str, capsys) -> 
     assert f"run.h5: bodies/{name} holds what is no number" in capsys.readouterr().err
 
 
+def test_fields_of_other_cells_are_one_line(broken: Path) -> None:
+    with h5py.File(broken / "run.h5", "r+") as h5:
+        put("grid/z", np.linspace(0, 0.2, 21))(h5)
+    with pytest.raises(BadRun, match=r"fields\.vtkhdf: .*its cells are not those of run\.h5"):
+        Run(broken).field_times  # noqa: B018
+
+
 def test_a_column_without_rows_is_one_line(broken: Path, capsys) -> None:
     with h5py.File(broken / "run.h5", "r+") as h5:
         put("series/wall_time", np.empty(0))(h5)

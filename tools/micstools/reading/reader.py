@@ -320,7 +320,8 @@ class Run:
         """Times [s] at which the fluid was written; empty for a run without fluid."""
         if not (self.folder / "fields.vtkhdf").is_file():
             return np.empty(0)
-        return self._read("fields.vtkhdf", _frame_times)
+        cells = tuple(len(face) - 1 for face in reversed(self.grid.faces))
+        return self._read("fields.vtkhdf", lambda h5: _frame_times(h5, cells))
 
     def fields_at(self, t: float) -> Fields:
         """The fluid at the written time nearest to `t` [s]."""
@@ -618,7 +619,9 @@ def _read_timers(h5: h5py.File) -> dict[str, tuple[float, int]]:
     return {_text(name): (float(seconds), int(calls)) for name, seconds, calls in rows}
 
 
-def _frame_times(h5: h5py.File) -> Array:
+def _frame_times(h5: h5py.File, cells: tuple[int, ...]) -> Array:
+    if h5["VTKHDF/CellData/liquid"].shape[1:] != cells:
+        raise ValueError("its cells are not those of run.h5")
     steps = h5["VTKHDF/Steps"]
     times = numbers(steps, "Values", None)[: max(0, int(_plain(steps.attrs["NSteps"])))]
     return np.asarray(rising(times, "times of the fields"))

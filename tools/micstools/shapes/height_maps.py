@@ -244,17 +244,34 @@ def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
     return HeightMap((first[0], first[1]), (edges[0], edges[1]), z)
 
 
-def _units_of_names(path: Path, head: str, unit: str | None) -> Array:
-    """Metres in the unit of each column of `head`, as in `x [ft], y (ft), z_m`; of all where none
-    is told the given one."""
-    told = re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", head) or re.findall(
-        rf"(?i)\b[a-z]+_({'|'.join(re.escape(n) for names in UNITS.values() for n in names)})\b",
-        head,
-    )
-    if len(told) not in (0, 1, 3):
-        raise BadRun(f"{path}: tells the units of {len(told)} columns of three: {head.strip()}")
-    units = told * 3 if len(told) == 1 else told or [unit or "m"] * 3
-    return np.array([metres(path, name) for name in units])
+_NAMES = (("x", "e", "east", "easting"), ("y", "n", "north", "northing"),
+          ("z", "h", "height", "elevation", "level", "depth", "water depth"))  # fmt: skip
+"""What the columns x, y and z are called."""
+_SUFFIX = "|".join(re.escape(name) for names in UNITS.values() for name in names)
+_BRACKETS = r"[\[(]\s*([^\])]+?)\s*[\])]"
+
+
+def _columns(path: Path, head: str, unit: str | None) -> tuple[list[int], Array, int]:
+    """Where x, y and z stand by the names of a head, as in `x [ft], y (ft), z_m`; metres in the
+    unit of each, of all where none or one is told; how many columns. Depths count down."""
+    if re.search("[,;\t]", head):
+        cells = re.split("[,;\t]", head)
+    else:
+        cells = [m[0] for m in re.finditer(rf"[^\s\[(]+(\s*{_BRACKETS})?", head)]
+    unit_of = re.compile(rf"(?i){_BRACKETS}|_({_SUFFIX})\s*$")
+    told = ["".join((unit_of.findall(cell) or [""])[0]) for cell in cells]
+    names = [unit_of.sub("", cell).strip(' \t"').lower() for cell in cells]
+    places = [[k for k, name in enumerate(names) if name in wanted] for wanted in _NAMES]
+    if any(len(at) != 1 for at in places):
+        raise BadRun(f"{path}: columns must be named x, y and z, or easting, northing, elevation "
+                     f"or depth: {head.strip()}")  # fmt: skip
+    at = [k for (k,) in places]
+    units = [told[k] for k in at if told[k]]
+    if len(units) not in (0, 1, 3):
+        raise BadRun(f"{path}: tells the units of {len(units)} columns of three: {head.strip()}")
+    units = units * 3 if len(units) == 1 else units or [unit or "m"] * 3
+    down = np.array([1, 1, -1 if "depth" in names[at[2]] else 1])
+    return at, down * [metres(path, name) for name in units], len(names)
 
 
 def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | None) -> HeightMap:
@@ -263,18 +280,24 @@ def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | 
     rows = [re.split(r"[\s,;]+", line.split("#")[0].strip(" \t,;")) for line in text]
     lines = [line for line, row in zip(text, rows, strict=True) if row != [""]]
     rows = [row for row in rows if row != [""]]
-    factors = _units_of_names(path, "", unit)
+    xyz, factors, wide = _columns(path, "x y z", unit)
     if rows and not any(map(_is_number, rows[0])):
-        factors = _units_of_names(path, lines[0], unit)
+        xyz, factors, wide = _columns(path, lines[0], unit)
         rows = rows[1:]
-    if not rows or any(len(row) != 3 for row in rows):
+    if not rows or any(len(row) != wide for row in rows):
         raise BadRun(f"{path}: must hold x, y and z in each line")
-    points = _numbers(path, [word for row in rows for word in row]).reshape(-1, 3)
+    points = _numbers(path, [row[k] for row in rows for k in xyz]).reshape(-1, 3)
     if not np.isfinite(points[:, :2]).all():
         raise BadRun(f"{path}: a place is not a number")
     points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
-    points *= factors
-    remarks = ("from other units to m",) * bool((factors != 1).any())
+    remarks = ("from other units to m",) * bool((np.abs(factors) != 1).any())
+    if factors[2] < 0 and (points[:, 2] > 0).any():
+        remarks += ("depths, which count down",)
+        points[:, 2] *= -1
+    points *= np.abs(factors)
+    said = re.findall(rf"(?i)#.*?\b({_SUFFIX})\b", "\n".join(text[:20]))
+    if said and not unit and (factors == 1).all() and metres(path, said[0]) != 1:
+        remarks += (f"a remark speaks of {said[0]}; taken in m, --unit tells another one",)
     numbers = r"[-+\d.]+([\s,;]+[-+\d.]+){2}\s*"
     lost = [n for n, line in enumerate(text, 1) if re.fullmatch(r"\s*#\s*" + numbers, line)]
     if lost:
