@@ -68,7 +68,7 @@ contains
     logical :: beside
 
     path = file
-    if (.not. has_choice(file)) return
+    if (index(file, '/') == 1 .or. .not. allocated(folder)) return
     inquire (file=folder//file, exist=beside)
     if (beside) path = folder//file
   end function found_file
@@ -79,17 +79,9 @@ contains
     character(:), allocatable :: text
 
     text = file
-    if (.not. has_choice(file)) return
+    if (index(file, '/') == 1 .or. .not. allocated(folder)) return
+    if (len(folder) == 0) return
     if (found_file(file) == file) text = file//' in the working folder, not beside the case'
   end function file_text
-
-  !> Can a file of this name be in two places?
-  function has_choice(file) result(yes)
-    character(*), intent(in) :: file
-    logical :: yes
-
-    yes = .false.
-    if (allocated(folder)) yes = len(folder) > 0 .and. index(file, '/') /= 1
-  end function has_choice
 
 end module named_files_m

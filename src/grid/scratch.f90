@@ -1,4 +1,4 @@
-!> Work arrays over cells and faces that stages of a step take and give back.
+!> Work arrays over cells that stages of a step take and give back.
 !!
 !! The stages of a step need more arrays than the state has, but not at once. A stage takes what it
 !! needs when it begins and gives it back when it ends; the pool grows until no stage has to wait.
@@ -8,7 +8,7 @@ module scratch_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: scratch_t, scratch_init, take, give, take_faces, give_faces
+  public :: scratch_t, scratch_init, take, give
 
   type :: scalar_t
     real(wp), allocatable :: a(:, :, :)
@@ -21,11 +21,9 @@ module scratch_m
   type :: scratch_t
     private
     integer :: first(3) = 1, last(3) = 0   !! cells of the arrays, with the halo
-    integer :: lo(3) = 1, hi(3) = 0        !! own cells
-    integer :: n_scalars = 0, n_vectors = 0, n_faces = 0   !! that are free
+    integer :: n_scalars = 0, n_vectors = 0   !! that are free
     type(scalar_t), allocatable :: scalars(:)
     type(vector_t), allocatable :: vectors(:)
-    type(vector_t), allocatable :: faces(:)   !! with one layer of the halo
   end type scratch_t
 
   !> An array of the cells with their halo, of one number or of three a cell.
@@ -47,9 +45,7 @@ contains
 
     self%first = grid%first
     self%last = grid%last
-    self%lo = grid%lo
-    self%hi = grid%hi
-    allocate (self%scalars(most), self%vectors(most), self%faces(most))
+    allocate (self%scalars(most), self%vectors(most))
   end subroutine scratch_init
 
   subroutine take_scalar(self, a)
@@ -70,39 +66,15 @@ contains
     type(scratch_t), intent(inout) :: self
     real(wp), allocatable, intent(inout) :: a(:, :, :, :)
 
-    call take_from(self%vectors, self%n_vectors, self%first, self%last, a)
-  end subroutine take_vector
-
-  !> Three numbers a cell with one layer of the halo, as coefficients of the lower faces.
-  subroutine take_faces(self, a)
-    type(scratch_t), intent(inout) :: self
-    real(wp), allocatable, intent(inout) :: a(:, :, :, :)
-
-    call take_from(self%faces, self%n_faces, self%lo - 1, self%hi + 1, a)
-  end subroutine take_faces
-
-  !> The last of the n free arrays over cells first..last, or a new one if there is none.
-  subroutine take_from(free, n, first, last, a)
-    type(vector_t), intent(inout) :: free(:)
-    integer, intent(inout) :: n
-    integer, intent(in) :: first(3), last(3)
-    real(wp), allocatable, intent(inout) :: a(:, :, :, :)
-
-    if (n > 0) then
-      call move_alloc(free(n)%a, a)
-      n = n - 1
+    if (self%n_vectors > 0) then
+      call move_alloc(self%vectors(self%n_vectors)%a, a)
+      self%n_vectors = self%n_vectors - 1
     else
-      allocate (a(first(1):last(1), first(2):last(2), first(3):last(3), 3), source=0.0_wp)
+      associate (f => self%first, l => self%last)
+        allocate (a(f(1):l(1), f(2):l(2), f(3):l(3), 3), source=0.0_wp)
+      end associate
     end if
-  end subroutine take_from
-
-  subroutine give_faces(self, a)
-    type(scratch_t), intent(inout) :: self
-    real(wp), allocatable, intent(inout) :: a(:, :, :, :)
-
-    self%n_faces = self%n_faces + 1
-    call move_alloc(a, self%faces(self%n_faces)%a)
-  end subroutine give_faces
+  end subroutine take_vector
 
   subroutine give_scalar(self, a)
     type(scratch_t), intent(inout) :: self

@@ -17,7 +17,8 @@ module liquid_transport_m
   use solid_geometry_m, only: solid_geometry_t
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
   use elliptic_solver_m, only: elliptic_solver_t
-  use open_flux_m, only: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
+  use narrow_band_m, only: narrow_band_init
+  use open_flux_m, only: open_flux_t, flux_of_velocity, fit_to_bodies
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
                            renew_shares
@@ -55,7 +56,7 @@ contains
     logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: m(3)
 
-    call open_flux_init(grid, self%flux, pooled)
+    call narrow_band_init(grid, self%flux%band)
     if (.not. present(pooled)) call carried_volumes_init(grid, self%volumes)
     call liquid_sweep_init(grid, gravity, self%sweeps)
     call small_cells_init(grid, self%small)

@@ -62,10 +62,9 @@ module narrow_band_m
 contains
 
   !> Allocate; lists grow by doubling.
-  subroutine narrow_band_init(grid, self, pooled)
+  subroutine narrow_band_init(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(out) :: self
-    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer, parameter :: first_parts = 64
     integer :: a(3), b(3)
 
@@ -73,9 +72,7 @@ contains
     b = grid%hi + 1
     allocate (self%marked(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%number, self%label, source=self%marked)
-    if (.not. present(pooled)) then
-      allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    end if
+    allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%line(2, size(self%marked, 2), size(self%marked, 3)), source=0)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
     call ensure_capacity(1, self%cell)

@@ -19,7 +19,7 @@ module open_flux_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: is_wall, gives_pressure
   use solid_geometry_m, only: solid_geometry_t
-  use narrow_band_m, only: narrow_band_t, narrow_band_init, reserve, reserve_for_all, &
+  use narrow_band_m, only: narrow_band_t, reserve, reserve_for_all, &
                          find_parts, sum_by_part, drop_part, find_open_lines
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
@@ -28,7 +28,7 @@ module open_flux_m
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
-  public :: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
+  public :: open_flux_t, flux_of_velocity, fit_to_bodies
 
   real(wp), parameter :: min_open = 1.0e-9_wp   !! mean open share below which a face is closed
 
@@ -45,15 +45,6 @@ module open_flux_m
   end type open_flux_t
 
 contains
-
-  !> Allocate the work arrays.
-  subroutine open_flux_init(grid, self, pooled)
-    type(grid_t), intent(in) :: grid
-    type(open_flux_t), intent(out) :: self
-    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
-
-    call narrow_band_init(grid, self%band, pooled)
-  end subroutine open_flux_init
 
   !> Make the volumes Q through the lower faces, positive in the direction of the axis, faces
   !! lo..hi+1, fit the bodies: in each cell of the band their sum is the loss of fluid volume.

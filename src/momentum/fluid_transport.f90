@@ -3,7 +3,7 @@ module fluid_transport_m
   use kinds_m, only: wp
   use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t
-  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
+  use scratch_m, only: scratch_t, take, give
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
@@ -73,7 +73,6 @@ contains
       call take(scratch, volumes%q)
       call take(scratch, volumes%g)
     end associate
-    call take_faces(scratch, self%liquid%flux%band%k)
     if (self%carries_momentum) call take(scratch, self%momentum%momentum)
   end subroutine begin_carrying
 
@@ -147,7 +146,6 @@ contains
       call give(scratch, volumes%q)
       call give(scratch, volumes%g)
     end associate
-    call give_faces(scratch, self%liquid%flux%band%k)
     if (self%carries_momentum) call give(scratch, self%momentum%momentum)
   end subroutine finish_carrying
 

@@ -6,7 +6,8 @@ module test_open_flux_m
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
-  use open_flux_m, only: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
+  use narrow_band_m, only: narrow_band_init
+  use open_flux_m, only: open_flux_t, flux_of_velocity, fit_to_bodies
   use random_counter_m, only: uniform
   use box_solid_m, only: simple_grid, set_boxes
   implicit none
@@ -102,7 +103,7 @@ contains
       call set_boxes(grid, low, high, old)
       call set_boxes(grid, low + move, high + move, new)
     end if
-    call open_flux_init(grid, flux)
+    call narrow_band_init(grid, flux%band)
     call elliptic_solver_init(grid, solver)
     flow%fluid_volume = grid%volume*(1.0_wp - old%alpha)
     do concurrent (d=1:3, k=1:11, j=1:10, i=1:9)
