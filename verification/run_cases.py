@@ -179,8 +179,7 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
 
 def checker(case: str) -> ModuleType | SimpleNamespace:
     """The check.py of a case: `check(runs, checks)`, and `VARIES` if its runs leave the defaults;
-    or the table in its place. It may import modules beside it, whose names must differ from case to
-    case."""
+    or the table in its place."""
     path = CASES / case / "check.py"
     if not path.exists():
         return expect.module(path.with_name("expect.toml"))
@@ -188,11 +187,7 @@ def checker(case: str) -> ModuleType | SimpleNamespace:
     if spec is None or spec.loader is None:
         raise RuntimeError(f"cannot read {path}")
     module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(path.parent))
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(str(path.parent))
+    spec.loader.exec_module(module)
     return module
 
 

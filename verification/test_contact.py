@@ -8,18 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from shared_runs import mics, results, run_text
-
-
-def call(work: Path, case: str, *words: str) -> tuple[int, str, str]:
-    """Exit code, output and messages of a run."""
-    done = run_text(work, case, *words)
-    return done.returncode, done.stdout, done.stderr
-
-
-def series(work: Path, name: str) -> np.ndarray:
-    with h5py.File(work / "mics-out" / "run.h5") as h5:
-        return h5[name][:]
+from micstools.reading.reader import Run
+from micstools.shapes.meshing import shape_text
+from shared_runs import mics, results, told
 
 
 def ellipsoid(path: Path, axes: tuple[float, float, float], n: int) -> None:
@@ -29,19 +20,16 @@ def ellipsoid(path: Path, axes: tuple[float, float, float], n: int) -> None:
 
     def at(axis: int, side: int, i: int, j: int) -> int:
         place = np.roll([side * n, 2 * i - n, 2 * j - n], axis)
-        return number.setdefault(tuple(place.tolist()), 2 + len(number))
+        return number.setdefault(tuple(place.tolist()), 1 + len(number))
 
     tets = []
     for axis, side in itertools.product(range(3), (-1, 1)):
         for i, j in itertools.product(range(n), range(n)):
             a, b, c, d = (at(axis, side, i + k, j + m) for k, m in ((0, 0), (1, 0), (1, 1), (0, 1)))
-            tets += [(1, a, b, c), (1, a, c, d)]
+            tets += [(0, a, b, c), (0, a, c, d)]
     cube = np.tan(np.pi / 4 * np.array(list(number)) / n)
     points = np.concatenate([[[0, 0, 0]], cube / np.linalg.norm(cube, axis=1)[:, None]]) * axes
-    lines = ["mics-shape 1", f"points {len(points)}"]
-    lines += [" ".join(repr(float(x)) for x in point) for point in points]
-    lines += [f"tets {len(tets)}"] + [" ".join(map(str, tet)) for tet in tets]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text(shape_text(points, np.array(tets)))
 
 
 def height_map(path: Path, z: np.ndarray, dx: float, dy: float) -> None:
@@ -59,9 +47,8 @@ def test_a_stone_lies_on_the_floor(squares: int, tmp_path: Path) -> None:
     &shape name = 'pebble'  kind = 'file'  file = 'pebble.txt' /
     &body shape = 'pebble'  position = 0.1, 0.1, 0.0095 /
     """
-    code, _, said = call(tmp_path, case, "--quiet")
-    assert (code, said) == (0, "")
-    height = series(tmp_path, "bodies/position")[-1, 0, 2]
+    assert told(tmp_path, case) == (0, "")
+    height = Run(tmp_path / "mics-out").bodies.position[-1, 0, 2]
     assert height == pytest.approx(0.009, abs=1.5e-4)
 
 
@@ -77,9 +64,8 @@ def test_a_beam_lies_on_a_crest(spacing: float, tmp_path: Path) -> None:
     &shape name = 'beam'  kind = 'box'  size = 0.3, 0.03, 0.03 /
     &body shape = 'beam'  position = 0.6, 0.15, 0.0955 /
     """
-    code, _, said = call(tmp_path, case, "--quiet")
-    assert (code, said) == (0, "")
-    height = series(tmp_path, "bodies/position")[-1, 0, 2]
+    assert told(tmp_path, case) == (0, "")
+    height = Run(tmp_path / "mics-out").bodies.position[-1, 0, 2]
     assert height == pytest.approx(0.095, abs=5e-4)
 
 
@@ -94,10 +80,10 @@ def test_only_what_is_held_up_sleeps(fixed: str, asleep: int, tmp_path: Path) ->
     &body shape = 'raft'  position = 0.1, 0.1, 0.0938  fixed = {fixed} /
     &body shape = 'stone'  position = 0.1, 0.1, 0.1287 /
     """
-    code, _, said = call(tmp_path, case, "--quiet")
+    code, said = told(tmp_path, case)
     assert code == 0
     assert all("was cut at its limit" in line for line in said.splitlines())  # a light raft
-    assert series(tmp_path, "series/sleeping")[-1] == asleep
+    assert Run(tmp_path / "mics-out").series.sleeping[-1] == asleep
 
 
 SLOPE, FRICTION, G = 0.6, 0.5, 9.81

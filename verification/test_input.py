@@ -232,14 +232,6 @@ def test_line_ends_and_byte_order_mark(ending: str, tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize("case", ["missing.nml", "."])
-def test_case_that_cannot_be_read(case: str, tmp_path: Path) -> None:
-    """A missing file and a folder are named and refused."""
-    done = mics([case], tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"mics: {case}: ")
-
-
 @pytest.mark.xdist_group("ranks")
 def test_every_rank_stops_and_one_speaks(tmp_path: Path) -> None:
     """The parallel build prints each message once and ends with the same code."""

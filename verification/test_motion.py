@@ -156,10 +156,10 @@ def test_fluid_of_a_door(coupling: str, tmp_path: Path) -> None:
         assert np.abs(b["fluid_force"][:]).max() > 0.1
 
 
-@pytest.mark.parametrize("physics", ["dry", "coupled"])
+@pytest.mark.parametrize("physics", ["dry", "light", "coupled"])
 def test_restart_changes_no_bit(physics: str, tmp_path: Path) -> None:
     """Gone on with from the restart file before the last, in the middle of the motion."""
-    head = WET if physics == "coupled" else DRY.replace(" /", "  restart_interval = 0.02 /", 1)
+    head = WET.replace(" /", f"  physics = '{physics}' /", 1)
     case = (head + PLATE + MOVED.format(more="") + CUBE.replace("0.06,", "0.10,")).format(end=0.09)
     (tmp_path / "way.csv").write_text(DOOR)
     assert shared_runs.after_restart(tmp_path, case) == []

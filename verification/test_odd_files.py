@@ -8,6 +8,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+import trimesh
 
 from run_cases import ROOT
 from shared_runs import call, program
@@ -36,7 +37,7 @@ def make(what: str, path: Path) -> str:
         return "/dev/zero"
     if what == "pipe":
         os.mkfifo(path)
-    else:
+    elif what == "folder":
         path.mkdir()
     return path.name
 
@@ -62,7 +63,7 @@ def test_named_in_a_case(variable: str, text: str, what: str, tmp_path: Path) ->
     assert not (tmp_path / "mics-out").exists()
 
 
-@pytest.mark.parametrize("what", ["pipe", "folder"])
+@pytest.mark.parametrize("what", ["pipe", "folder", "nothing"])
 @pytest.mark.parametrize("role", ["case", "restart"])
 def test_named_in_the_command(role: str, what: str, tmp_path: Path) -> None:
     """The same for the case, code 2, and for the restart file, code 4."""
@@ -71,7 +72,7 @@ def test_named_in_the_command(role: str, what: str, tmp_path: Path) -> None:
     words = ["odd"] if role == "case" else ["--restart", "odd", "case.nml"]
     done = mics(tmp_path, *words)
     assert done.returncode == (2 if role == "case" else 4), done.stderr
-    assert "odd: " in done.stderr and (what != "pipe" or "is a pipe" in done.stderr)
+    assert done.stderr.startswith("mics: odd: ") and (what != "pipe" or "is a pipe" in done.stderr)
     assert not (tmp_path / "mics-out").exists()
 
 
@@ -122,13 +123,7 @@ def test_control_characters(role: str, bad: str, tmp_path: Path) -> None:
 
 
 TETS = "mics-shape 1\npoints 4\n0 0 0\n.1 0 0\n0 .1 0\n0 0 .1\ntets 1\n1 2 3 4\n"
-CORNERS = ("0 0 0", ".1 0 0", "0 .1 0", "0 0 .1")
-STL = "solid a\n" + "".join(
-    "facet normal 0 0 0\nouter loop\n"
-    + "".join(f"vertex {CORNERS[k]}\n" for k in facet)
-    + "endloop\nendfacet\n"
-    for facet in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
-) + "endsolid a\n"  # fmt: skip
+STL = trimesh.creation.box((0.1, 0.1, 0.1)).export(file_type="stl_ascii")
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import f90nml
 import jsonschema
 import numpy as np
 import pytest
+import trimesh
 
 from micstools.cases.initial_state import write_initial_state
 from micstools.reading.reader import Run
@@ -103,14 +104,8 @@ def test_unknown_group(tmp_path: Path) -> None:
 def write_files(folder: Path) -> None:
     """The files that examples name."""
     (folder / "mound.txt").write_text("2 2 0 0 0.3 0.1\n" + 4 * "0.01\n")
-    corners = ["0 0 0.01", "0.3 0 0.01", "0.3 0.1 0.01", "0 0.1 0.01"]
-    facets = [
-        "facet normal 0 0 1\nouter loop\n"
-        + "".join(f"vertex {corners[k]}\n" for k in triangle)
-        + "endloop\nendfacet\n"
-        for triangle in ((0, 1, 2), (0, 2, 3))
-    ]
-    (folder / "slope.stl").write_text("solid bed\n" + "".join(facets) + "endsolid bed\n")
+    corners = [(0, 0, 0.01), (0.3, 0, 0.01), (0.3, 0.1, 0.01), (0, 0.1, 0.01)]
+    trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)]).export(folder / "slope.stl")
     (folder / "block.txt").write_text(
         "mics-shape 1\npoints 4\n0 0 0\n0.05 0 0\n0 0.05 0\n0 0 0.05\ntets 1\n1 2 3 4\n"
     )

@@ -9,11 +9,12 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
 from micstools import cli
 from micstools.reading import result_file, units
-from micstools.reading.profiles import along_line, table
+from micstools.reading.profiles import along_line
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living
 from synthetic import THREE_LEGS, Motion, write_run
@@ -135,30 +136,6 @@ def test_profile_reads_a_line_and_refuses_others(loose_pile: Run) -> None:
         loose_pile.profile((0, 0, 0), (0.1, 0, 0), "speed", 2.0)
     with pytest.raises(ValueError, match="leaves the tank"):
         loose_pile.profile((0, 0, 0), (9, 0, 0), "liquid", 2.0)
-
-
-def test_series_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
-    rows = table(loose_pile.series_to_csv(tmp_path / "series.csv"))
-    assert len(rows) == 401
-    assert float(rows[-1]["time"]) == loose_pile.series.time[-1]
-
-
-def test_blocks_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
-    b = loose_pile.bodies
-    rows = table(loose_pile.to_csv(tmp_path / "blocks.csv"))
-    assert len(rows) == b.n * len(b.time)
-    found = rows[b.n * 5 + 3]  # the fourth block in the sixth row
-    assert (found["block"], found["shape"]) == ("4", b.shape[3])
-    for name, value in (
-        ("time", b.time[5]),
-        ("z", b.position[5, 3, 2]),
-        ("qw", b.quaternion[5, 3, 0]),
-        ("vz", b.velocity[5, 3, 2]),
-        ("wx", b.angular_velocity[5, 3, 0]),
-        ("fluid_fz", b.fluid_force[5, 3, 2]),
-        ("contact_ty", b.contact_torque[5, 3, 1]),
-    ):
-        assert float(found[name]) == value
 
 
 def test_the_scene_of_a_time(loose_pile: Run, tmp_path: Path) -> None:
@@ -338,13 +315,25 @@ def test_a_column_without_rows_is_one_line(broken: Path, capsys) -> None:
     assert capsys.readouterr().err.endswith("run holds no row of results yet\n")
 
 
-def test_blocks_as_a_table(loose_pile: Run) -> None:
+def test_rows_as_tables(loose_pile: Run, tmp_path: Path) -> None:
+    """Of all blocks and of the numbers of the run; as files they are the same."""
     b, found = loose_pile.bodies, loose_pile.blocks
     assert len(found) == b.n * len(b.time)
     row = found[(found.block == 4) & (found.time == b.time[5])].iloc[0]
-    assert row[["x", "y", "z"]].tolist() == b.position[5, 3].tolist()
-    assert row["contact_ty"] == b.contact_torque[5, 3, 1] and row["shape"] == b.shape[3]
-    assert row["released"] == int(b.present(5)[3])
+    for names, values in (
+        (["x", "y", "z"], b.position),
+        (["qw", "qx", "qy", "qz"], b.quaternion),
+        (["vx", "vy", "vz"], b.velocity),
+        (["wx", "wy", "wz"], b.angular_velocity),
+        (["fluid_fx", "fluid_fy", "fluid_fz"], b.fluid_force),
+        (["contact_tx", "contact_ty", "contact_tz"], b.contact_torque),
+    ):
+        assert row[names].tolist() == values[5, 3].tolist()
+    assert (row["shape"], row["released"]) == (b.shape[3], int(b.present(5)[3]))
+    written = pd.read_csv(loose_pile.to_csv(tmp_path / "blocks.csv"), keep_default_na=False)
+    pd.testing.assert_frame_equal(written, found, check_dtype=False, rtol=1e-15, atol=0)
+    series = pd.read_csv(loose_pile.series_to_csv(tmp_path / "series.csv"))
+    assert series.time.tolist() == loose_pile.series.time.tolist()
     last = found.groupby("block").last()
     assert last.z.to_numpy() == pytest.approx(b.position[-1, :, 2])
     units = found.attrs["units"]

@@ -144,12 +144,6 @@ def test_every_tool_and_option_named_is_there(page: str) -> None:
             assert option in known, f"mics-tools {name} {option}"
 
 
-def test_every_case_run_is_there() -> None:
-    for page in TEXTS:
-        for case in re.findall(r"input/\w+\.(?:nml|txt)", (ROOT / page).read_text()):
-            assert (ROOT / case).is_file(), f"{page}: {case}"
-
-
 def test_the_table_of_tools_holds_tools() -> None:
     text = (ROOT / "docs" / "guide.md").read_text().partition("| command |")[2].partition("\n\n")[0]
     rows = [line.split("|")[1] for line in text.splitlines()[2:]]

@@ -4,8 +4,8 @@ Each `[[expect]]` has a `quantity`, an f-string, and a `number` that must be `be
 `within` two bounds, or `close` to a number within a relative `band`; or a statement that must be
 `true`, with `figures` that tell it. Texts are Python over a run: `run`, its bodies `b`, series `s`,
 folder `name`, `value(group, variable)`, `state()` of its restart file, `np`, `norm`,
-`EXCESS_LIMIT`, and what `[let]` names. `runs` chooses runs by a pattern; `counts = false` marks a
-row for information.
+`EXCESS_LIMIT`, and what `[let]` names. `runs` chooses runs by a pattern; where `counts` is false
+a row is for information.
 """
 
 import tomllib
@@ -17,10 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from measures.balance import liquid_between
 from measures.checks import Checks
 from micstools.reading.energy import made_by_contact
 from micstools.reading.health import EXCESS_LIMIT
 from micstools.reading.reader import Run
+from micstools.shapes.geometry import rotation_matrix
 
 
 def module(path: Path) -> SimpleNamespace:
@@ -42,6 +44,7 @@ def judge(rows: list[dict[str, Any]], names: dict[str, str], run: Run, checks: C
         "run": run, "b": run.bodies, "s": run.series, "name": run.folder.name, "np": np,
         "norm": np.linalg.norm, "value": run.value, "state": run.restart,
         "EXCESS_LIMIT": EXCESS_LIMIT, "made_by_contact": made_by_contact,
+        "liquid_between": liquid_between, "rotation_matrix": rotation_matrix,
     }  # fmt: skip
 
     def of(text: Any) -> Any:
@@ -53,7 +56,7 @@ def judge(rows: list[dict[str, Any]], names: dict[str, str], run: Run, checks: C
         if not fnmatch(run.folder.name, row.get("runs", "*")):
             continue
         say: Callable[[str], str] = lambda text: str(of(f"f{text!r}"))  # noqa: E731
-        quantity, counts = say(row["quantity"]), row.get("counts", True)
+        quantity, counts = say(row["quantity"]), bool(of(row.get("counts", True)))
         if "true" in row:
             checks.true(quantity, of(row["true"]), say(row.get("figures", "")), counts)
         elif "below" in row:

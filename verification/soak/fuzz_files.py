@@ -25,6 +25,7 @@ import h5py
 import numpy as np
 import trimesh
 
+from micstools.shapes.meshing import shape_text
 from run_cases import ROOT
 from run_soak import Given
 
@@ -83,9 +84,7 @@ def tets_of_grid(n: int) -> tuple[list[tuple[float, float, float]], list[list[in
 def own_form(rng: random.Random) -> bytes:
     """The program's own shape file."""
     points, tets = tets_of_grid(rng.randint(1, 4))
-    rows = ["mics-shape 1", f"points {len(points)}", *(" ".join(map(repr, p)) for p in points)]
-    rows += [f"tets {len(tets)}", *(" ".join(map(str, t)) for t in tets)]
-    return ("\n".join(rows) + "\n").encode()
+    return shape_text(np.array(points), np.array(tets) - 1).encode()
 
 
 def gmsh(rng: random.Random) -> bytes:

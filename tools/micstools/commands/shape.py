@@ -30,7 +30,7 @@ def work(given: argparse.Namespace) -> int:
         print(f"warning: {warning}", file=sys.stderr)
     shape, centroid = meshing.block(given.file.stem, tets, given.density)
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    meshing.write_shape(given.out, shape)
+    given.out.write_text(meshing.shape_text(shape.points, shape.tets))
     print(meshing.report(shape, centroid))
     print(given.out)
     if not given.no_picture and not scene.missing_libraries():

@@ -1,7 +1,4 @@
-"""Values of a field along a line, and reference profiles from CSV files."""
-
-import csv
-from pathlib import Path
+"""Values of a field along a line."""
 
 import numpy as np
 
@@ -47,9 +44,3 @@ def with_ends(low: float, values: Array, high: float) -> Array:
     """Values at cell centres along the last axis with those on the two walls around them."""
     ends = [np.full((*values.shape[:-1], 1), value) for value in (low, high)]
     return np.concatenate([ends[0], values, ends[1]], axis=-1)
-
-
-def table(path: Path) -> list[dict[str, str]]:
-    """Rows of a CSV file whose first lines, with a #, name the source."""
-    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
-    return list(csv.DictReader(lines))

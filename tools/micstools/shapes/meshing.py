@@ -319,13 +319,13 @@ def block(name: str, tets: Array, density: float) -> tuple[Shape, Array]:
     return from_tets(name, tets, density), centroid
 
 
-def write_shape(path: Path, shape: Shape) -> None:
+def shape_text(points: Array, tets: IntArray) -> str:
     """The program's own shape file, with all digits."""
-    lines = ["mics-shape 1", f"points {len(shape.points)}"]
-    lines += [" ".join(repr(float(x)) for x in point) for point in shape.points]
-    lines += [f"tets {len(shape.tets)}"]
-    lines += [" ".join(str(int(corner) + 1) for corner in tet) for tet in shape.tets]
-    path.write_text("\n".join(lines) + "\n")
+    lines = ["mics-shape 1", f"points {len(points)}"]
+    lines += [" ".join(repr(float(x)) for x in point) for point in points]
+    lines += [f"tets {len(tets)}"]
+    lines += [" ".join(str(int(corner) + 1) for corner in tet) for tet in tets]
+    return "\n".join(lines) + "\n"
 
 
 def report(shape: Shape, shift: Array) -> str:

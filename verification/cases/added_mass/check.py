@@ -3,10 +3,10 @@
 from functools import cache
 
 import numpy as np
-from potential import circle_in_square, sphere_in_cube
 
 from measures.checks import Checks
 from measures.facts import added_mass
+from measures.potential import circle_in_square, sphere_in_cube
 from micstools.reading.reader import Run
 
 VARIES = ("numerics coupling",)

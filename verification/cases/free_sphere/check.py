@@ -1,12 +1,10 @@
-"""Way and speed of a sphere let go in still water against potential theory for the box.
-
-usage: python check.py RUN [RUN ...]; runs that differ in dt only are compared with one another
-"""
+"""Way and speed of a sphere let go in still water against potential theory for the box."""
 
 import numpy as np
 
 from measures.checks import Checks
 from measures.facts import liquid
+from measures.potential import sphere_in_cube
 from micstools.reading.reader import Run
 
 VARIES = tuple(
@@ -17,31 +15,6 @@ THEORY_BAND, STEP_BAND = 0.02, 0.01
 START_BAND = 0.03  # of way and speed at the ends of the first steps, at the default step
 SPIN_BAND = 1.0  # speed of the surface by spin over that of the sphere
 SHORT = 0.01  # s: runs with longer steps are looked at step by step
-
-
-def image_sum(reach: int) -> float:
-    """Sum over the mirror images of an upright dipole in a box of unit edge: (3 z^2 - r^2)/r^5.
-
-    The images stand on a lattice; mirrors above and below turn the dipole round. Two successive
-    reaches lie on either side of the limit, so their mean is taken.
-    """
-
-    def up_to(n: int) -> float:
-        k = np.arange(-n, n + 1)
-        x, y, z = np.meshgrid(k, k, k, indexing="ij")
-        r2 = x * x + y * y + z * z
-        r2[n, n, n] = 1
-        term = np.where(z % 2 == 0, 1, -1) * (3 * z * z - r2) / r2**2.5
-        term[n, n, n] = 0.0
-        return float(term.sum())
-
-    return (up_to(reach) + up_to(reach + 1)) / 2
-
-
-def added_mass(diameter: float, box: float) -> float:
-    """Added mass of a sphere in the middle of a cubic box over the mass of fluid it displaces."""
-    stream = image_sum(40) * (diameter / 2 / box) ** 3 / 2
-    return 1.5 / (1 + stream) - 1
 
 
 def acceleration(run: Run) -> float:
@@ -72,7 +45,7 @@ def check(runs: list[Run], checks: Checks) -> None:
         shape, g, b = run.shapes[run.bodies.shape[0]], run.gravity[2], run.bodies
         ratio, dt = shape.density / liquid(run)[0], run.value("run", "dt")
         diameter = 2 * (3 * shape.volume / (4 * np.pi)) ** (1 / 3)
-        theory = (ratio - 1) / (ratio + added_mass(diameter, box))
+        theory = (ratio - 1) / (ratio + sphere_in_cube(diameter, box))
         if run.folder.name.endswith("spin"):
             spin = np.linalg.norm(b.angular_velocity[1:, 0], axis=1) * diameter / 2
             speed = np.linalg.norm(b.velocity[1:, 0], axis=1)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from micstools.shapes.meshing import shape_text
+
 SIDES, LAYERS, HALF_WIDTH, HEIGHT = 96, 8, 1.2, 4.0
 
 angle = 2 * np.pi * np.arange(SIDES) / SIDES  # holds the four corners
@@ -25,7 +27,4 @@ for layer in range(LAYERS):
             high = [n + 2 * SIDES for n in low]
             tets += [(*low, high[2]), (low[0], low[1], high[1], high[2]), (low[0], *high)]
 
-lines = ["mics-shape 1", f"points {len(points)}"]
-lines += [" ".join(f"{x:.15g}" for x in p) for p in points]
-lines += [f"tets {len(tets)}", *(" ".join(str(n + 1) for n in t) for t in tets)]
-Path("tube.txt").write_text("\n".join(lines) + "\n")
+Path("tube.txt").write_text(shape_text(np.array(points), np.array(tets)))

@@ -4,14 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
+from micstools.shapes.meshing import shape_text
+
 WIDTH, LENGTH = 0.15, 0.02
 
 for degrees in (20, 30, 40):
     height = WIDTH * np.tan(np.radians(degrees))
     section = [(0.0, 0.0), (WIDTH, height), (0.0, height)]
     points = [(x, y, z) for y in (0.0, LENGTH) for x, z in section]
-    tets = [(1, 2, 3, 6), (1, 2, 6, 5), (1, 5, 6, 4)]
-    lines = ["mics-shape 1", f"points {len(points)}"]
-    lines += [" ".join(f"{x:.15g}" for x in p) for p in points]
-    lines += [f"tets {len(tets)}", *(" ".join(str(n) for n in t) for t in tets)]
-    Path(f"wedge_{degrees}.txt").write_text("\n".join(lines) + "\n")
+    tets = np.array([(0, 1, 2, 5), (0, 1, 5, 4), (0, 4, 5, 3)])
+    Path(f"wedge_{degrees}.txt").write_text(shape_text(np.array(points), tets))

@@ -58,7 +58,7 @@ contains
     call check_energy()
     if (solvers(model) == 'springs') call check_constants()
     call check_added_mass()
-    call check_moving_counterparts()
+    call check_moving_floor()
     call check_periodic_image()
     call check_bookkeeping()
     call check_runaway()
@@ -364,8 +364,8 @@ contains
     call check('damped', damped%blocks%v(3, 1) > 0.05_wp .and. damped%blocks%v(3, 1) < 0.45_wp)
   end subroutine check_constants
 
-  !> A sliding floor drags a cube along; a moved body pushes a ball to (1 + e) times its own speed.
-  subroutine check_moving_counterparts()
+  !> A sliding floor drags a cube along; what a moved body pushes is in test_motion.py.
+  subroutine check_moving_floor()
     type(world_t) :: world
 
     call start('', tank//'&boundary z_min="no_slip" z_min_velocity=.2,-.1,0/ '//cube &
@@ -375,13 +375,7 @@ contains
     call check('dragged by mu g', norm2(world%blocks%v(1:2, 1)), 0.4_wp*g*20*dt, 5.0e-3_wp)
     call move(world, 200, dt)
     call check('moves with the floor', world%blocks%v(:, 1), [0.2_wp, -0.1_wp, 0.0_wp], 1.0e-6_wp)
-    call start(smooth//'.5', space//ball//body('ball', middle, [0.4_wp, 0.0_wp, 0.0_wp], &
-      more='fixed=T')//body('ball', middle + [1.01_wp*d, 0.0_wp, 0.0_wp]), world)
-    call move(world, 10, dt)
-    call check('pushed', world%blocks%v(1, 2), 0.6_wp, 0.005_wp)
-    call check('the pusher keeps its speed', world%blocks%v(1, 1), 0.4_wp)
-    call check('and its way', world%blocks%x(1, 1), 0.5_wp + 10*dt*0.4_wp, 1.0e-14_wp)
-  end subroutine check_moving_counterparts
+  end subroutine check_moving_floor
 
   !> Two balls collide through a periodic side as they do in the middle.
   subroutine check_periodic_image()

@@ -6,9 +6,9 @@ module test_light_m
     potential_energy
   use panel_method_m, only: added_inertia_t, added_inertia
   use panels_m, only: surface_panels
-  use light_m, only: resume_light, step_in_water, enter_water, store_water_force, added_inertia_of
+  use light_m, only: step_in_water, enter_water, store_water_force, added_inertia_of
   use vectors_m, only: quaternion_from_axis
-  use world_m, only: world_t, set_up, begin, body
+  use world_m, only: world_t, set_up, body
   implicit none
   private
   public :: test_light
@@ -31,7 +31,6 @@ contains
     call check_spin()
     call check_energy()
     call check_sleepers()
-    call check_resumed()
   end subroutine test_light
 
   !> Cubes in the tank of the paper.
@@ -198,7 +197,7 @@ contains
     do n = 40, 400, 360
       call start(2300.0_wp, world, at(level + 0.6_wp*edge, [0.0_wp, 0.0_wp, fall]), &
         shape=' drag_coefficient=0')
-        do i = 1, n
+      do i = 1, n
         call enter(0.0_wp*gravity, world)
         call drift(1.2_wp*edge/real(n, wp)/0.4_wp, world%blocks)
       end do
@@ -301,30 +300,5 @@ contains
     call check('the force on a sleeper stays', world%light%force(3, 1), 7.0_wp)
     call check('a sleeper that sticks out feels the level', world%light%force(3, 2) > 1.05_wp*force)
   end subroutine check_sleepers
-
-  !> What a restart file does not hold follows from what it holds, to the bit.
-  subroutine check_resumed()
-    type(world_t) :: world, again
-
-    call start(2300.0_wp, world, at(level + 0.4_wp*edge))
-    call step(30, 1.0e-3_wp, world)
-    call begin(world%case, world, again)
-    again%blocks%x = world%blocks%x
-    again%blocks%lost = world%blocks%lost
-    again%blocks%q = world%blocks%q
-    again%blocks%v = world%blocks%v
-    again%blocks%l = world%blocks%l
-    again%blocks%omega = world%blocks%omega
-    again%light%level = world%light%level
-    again%light%wet = world%light%wet
-    again%light%force = world%light%force
-    again%initialised = world%initialised
-    call resume_light(again%blocks, again%light)
-    call step(30, 1.0e-3_wp, world)
-    call step(30, 1.0e-3_wp, again)
-    call check('a restart goes on as it would have', all(abs(again%blocks%v - world%blocks%v) &
-      <= 0.0_wp) .and. all(abs(again%blocks%fluid_force - world%blocks%fluid_force) <= 0.0_wp))
-    call check('in the middle of an entry', world%light%wet(1) > 0.0_wp)
-  end subroutine check_resumed
 
 end module test_light_m

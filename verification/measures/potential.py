@@ -1,7 +1,12 @@
 """Added mass in closed containers with slip walls, by potential flow."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.polynomial.legendre import leggauss
+
+Field = Callable[[np.ndarray], np.ndarray]
 
 
 def sphere_in_cube(diameter: float, edge: float, degree: int = 25) -> float:
@@ -44,9 +49,9 @@ def circle_in_square(diameter: float, edge: float, degree: int = 41) -> float:
     def part(n: int, x: np.ndarray) -> np.ndarray:
         power = (x[0] / half + 1j * x[1] / half) ** n
         r2 = (x**2).sum(axis=0)
-        return power.imag * (1 + (a * a / r2) ** n)
+        return np.asarray(power.imag * (1 + (a * a / r2) ** n))
 
-    def slopes(function) -> np.ndarray:
+    def slopes(function: Field) -> np.ndarray:
         step, found = 1e-6 * half, []
         for x, d in sides:
             ahead, behind = x.copy(), x.copy()
@@ -55,7 +60,7 @@ def circle_in_square(diameter: float, edge: float, degree: int = 41) -> float:
             found.append((function(ahead) - function(behind)) / (2 * step) * root)
         return np.concatenate(found)
 
-    columns = np.array([slopes(lambda x, n=n: part(n, x)) for n in range(1, degree + 1, 2)])
+    columns = np.array([slopes(partial(part, n)) for n in range(1, degree + 1, 2)])
     scale = np.abs(columns).max(axis=1)
     target = -slopes(lambda x: -a * a * x[1] / (x**2).sum(axis=0))
     free = np.linalg.lstsq((columns / scale[:, None]).T, target, rcond=None)[0] / scale
@@ -63,14 +68,14 @@ def circle_in_square(diameter: float, edge: float, degree: int = 41) -> float:
 
 
 def _norm(x: np.ndarray) -> np.ndarray:
-    return np.sqrt((x**2).sum(axis=0))
+    return np.asarray(np.sqrt((x**2).sum(axis=0)))
 
 
-def _gradient(function, x: np.ndarray, axis: int) -> np.ndarray:
+def _gradient(function: Field, x: np.ndarray, axis: int) -> np.ndarray:
     """Derivative along an axis by the complex step."""
     shifted = x.astype(complex)
     shifted[axis] += 1e-30j
-    return function(shifted).imag / 1e-30
+    return np.asarray(function(shifted).imag / 1e-30)
 
 
 def _slope(x: np.ndarray, axis: int, n: int, m: int, a: float, half: float) -> np.ndarray:
@@ -95,4 +100,4 @@ def _solid(x: np.ndarray, n: int, m: int) -> np.ndarray:
     lower, here = np.zeros_like(x[0]), np.ones_like(x[0])
     for k in range(m, n):  # (k - m + 1) P_(k+1) = (2 k + 1) z P_k - (k + m) r^2 P_(k-1)
         lower, here = here, ((2 * k + 1) * x[2] * here - (k + m) * r2 * lower) / (k - m + 1)
-    return real * here
+    return np.asarray(real * here)
