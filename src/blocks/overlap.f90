@@ -6,6 +6,7 @@
 !! no order of the work can change.
 module overlap_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm, rotation_matrix
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
@@ -275,9 +276,12 @@ contains
       end do
     end do
     call make_ready(x - body%radius, x + body%radius, bed, found, any_order=.true.)
-    do m = 1, found%edges%n
-      if (bed%surface%edge_number(found%edges%item(m)) > bed%surface%n_convex) cycle
-      associate (edge => bed%surface%edge(found%edges%item(m)))
+    found%of_bed%n = found%edges%n
+    call ensure_capacity(found%edges%n, found%of_bed%item)
+    found%of_bed%item(:found%edges%n) = found%edges%item(:found%edges%n)
+    do m = 1, found%of_bed%n
+      if (bed%surface%edge_number(found%of_bed%item(m)) > bed%surface%n_convex) cycle
+      associate (edge => bed%surface%edge(found%of_bed%item(m)))
         do i = 0, ceiling(edge%extent/body%spacing)
           p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x
           if (dot_product(p, p) > body%radius**2) cycle

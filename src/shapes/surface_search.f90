@@ -49,6 +49,7 @@ module surface_search_m
   !> Facets and edges found by a search.
   type :: found_t
     type(near_list_t) :: facets, edges
+    type(near_list_t) :: of_bed   !! edges that are visited while others are searched
   end type found_t
 
   real(wp), parameter :: nowhere = 1.0e30_wp   !! distance from nothing [m]

@@ -2,6 +2,7 @@
 for pandas and xarray; units by the size of the blocks."""
 
 import shutil
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -289,6 +290,18 @@ def test_a_damaged_file_is_one_line(broken: Path, kind: str, capsys) -> None:
         cli.main(["report", str(broken)])
     (line,) = capsys.readouterr().err.splitlines()
     assert end.value.code == 2 and line.startswith(f"mics-tools report: {broken}/run.h5: ")
+
+
+def test_damage_keeps_no_other_thread_from_reading(broken: Path, loose_pile: Run) -> None:
+    """A studio hung on a damaged shape, as long as its exception was kept."""
+    with h5py.File(broken / "run.h5", "r+") as h5:
+        drop("shapes/hexapod/points")(h5)
+    with pytest.raises(BadRun) as kept:
+        Run(broken).shapes  # noqa: B018
+    other = threading.Thread(target=lambda: Run(loose_pile.folder).bodies, daemon=True)
+    other.start()
+    other.join(20.0)
+    assert not other.is_alive(), kept
 
 
 @pytest.mark.parametrize("name", ["position", "quaternion", "velocity", "contact_force"])

@@ -429,7 +429,7 @@ def _plain(value: Any) -> Any:
 
 
 def _read_provenance(h5: h5py.File) -> dict[str, Any]:
-    found = {name: _plain(value) for name, value in h5["provenance"].attrs.items()}
+    found = {name: _plain(value) for name, value in list(h5["provenance"].attrs.items())}
     return found | {
         "namelist": str(found["namelist"]),
         "exit_status": int(found.get("exit_status", -1)),
@@ -466,7 +466,10 @@ def _text(value: Any) -> str:
 
 
 def _read_shapes(h5: h5py.File) -> dict[str, Shape]:
-    shapes = {name: _read_shape(name, group) for name, group in h5.get("shapes", {}).items()}
+    # As a list: while its items are visited, h5py lets no other thread read, nor as long as anybody
+    # keeps the exception that ended the visit.
+    groups = list(h5.get("shapes", {}).items())
+    shapes = {name: _read_shape(name, group) for name, group in groups}
     for name, shape in shapes.items():
         tank, reach = _read_grid(h5), np.abs(shape.points).max(initial=0.0)
         _require_size(shape.points, f"shape {name}", h5)
