@@ -1,7 +1,7 @@
 !> Sums over all cells of all processes that give the same bits in any order (see
 !! `exact_accumulator_m`).
 !!
-!! `exact_sum`, `exact_sums`, `exact_dot` and `exact_dots` need one message each. For terms that
+!! `exact_sum`, `exact_dot` and `exact_dots` need one message each. For terms that
 !! arise here and there, like forces on bodies, keep accumulators: start from `no_terms`,
 !! `exact_add` terms, `merge_accumulators` of threads, and turn all of them into numbers with one
 !! `exact_totals`.
@@ -13,7 +13,7 @@ module exact_sum_m
   use timers_m, only: timer, tic, toc
   implicit none
   private
-  public :: exact_sum, exact_sums, exact_dot, exact_dots
+  public :: exact_sum, exact_dot, exact_dots
   public :: accumulator_size, no_terms, exact_add, exact_add_columns, exact_totals
   public :: terms_at_once
 
@@ -26,28 +26,26 @@ contains
   function exact_sum(a) result(s)
     real(wp), intent(in) :: a(:)
     real(wp) :: s
-    integer(i8) :: accumulator(accumulator_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1), mine(accumulator_size)
     real(wp) :: total(1)
+    integer :: first
 
     accumulator(:, 1) = no_terms
-    call add_column(a, accumulator(:, 1))
+    ! chunk by chunk, on all threads if there are many terms
+    !$omp parallel private(mine) if (size(a) > worth_threads)
+    mine = no_terms
+    !$omp do schedule(static)
+    do first = 1, size(a), chunk_size
+      call exact_add(a(first:min(first + chunk_size - 1, size(a))), mine)
+    end do
+    !$omp end do nowait
+    !$omp critical (merge_columns)
+    call merge_accumulators(mine, accumulator(:, 1))
+    !$omp end critical (merge_columns)
+    !$omp end parallel
     call exact_totals(accumulator, total)
     s = total(1)
   end function exact_sum
-
-  !> Sums of the columns of `a` over all processes, with one message.
-  function exact_sums(a) result(s)
-    real(wp), intent(in) :: a(:, :)   !! (terms, sums); the terms may differ by process
-    real(wp) :: s(size(a, 2))
-    integer(i8) :: accumulator(accumulator_size, size(a, 2))
-    integer :: m
-
-    do m = 1, size(a, 2)
-      accumulator(:, m) = no_terms
-      call add_column(a(:, m), accumulator(:, m))
-    end do
-    call exact_totals(accumulator, s)
-  end function exact_sums
 
   !> Sum of x*y over the inner cells of all processes.
   function exact_dot(x, y, width, line) result(s)
@@ -128,26 +126,6 @@ contains
       s(m) = accumulator_value(accumulator(:, m))
     end do
   end subroutine exact_totals
-
-  !> Add all elements of a column, chunk by chunk, on all threads if it is long.
-  subroutine add_column(a, accumulator)
-    real(wp), intent(in) :: a(:)
-    integer(i8), intent(inout) :: accumulator(accumulator_size)
-    integer(i8) :: mine(accumulator_size)
-    integer :: first
-
-    !$omp parallel private(mine) if (size(a) > worth_threads)
-    mine = no_terms
-    !$omp do schedule(static)
-    do first = 1, size(a), chunk_size
-      call exact_add(a(first:min(first + chunk_size - 1, size(a))), mine)
-    end do
-    !$omp end do nowait
-    !$omp critical (merge_columns)
-    call merge_accumulators(mine, accumulator)
-    !$omp end critical (merge_columns)
-    !$omp end parallel
-  end subroutine add_column
 
   !> Add the products of the inner cells, plane by plane, on all threads if there are many.
   subroutine add_products(x, y, width, line, accumulator)

@@ -1,11 +1,25 @@
 !> Polygons in space.
 module polygon_m
   use kinds_m, only: wp
+  use vectors_m, only: cross
   implicit none
   private
-  public :: clip_polygon
+  public :: clip_polygon, area_vector
 
 contains
+
+  !> Area of a flat polygon times the unit normal of the side from which its corners run
+  !! counter-clockwise [m2].
+  pure function area_vector(p) result(area)
+    real(wp), intent(in) :: p(:, :)   !! (3, n) corners [m]
+    real(wp) :: area(3)
+    integer :: c
+
+    area = 0.0_wp
+    do c = 2, size(p, 2) - 1
+      area = area + 0.5_wp*cross(p(:, c) - p(:, 1), p(:, c + 1) - p(:, 1))
+    end do
+  end function area_vector
 
   !> Keep the part of a convex polygon where side*(x(d) - plane) >= 0; it has one corner more at
   !! most.

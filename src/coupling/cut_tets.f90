@@ -4,15 +4,13 @@ module cut_tets_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: cross
   use polyhedron_m, only: tet_volume
+  use tet_mesh_m, only: opposite
   use share_lists_m, only: body_shares_t
   implicit none
   private
   public :: cut_tets_t, list_cut_tets, faces_of_tet
 
   real(wp), parameter :: near_face = 1.0e-12_wp    !! a gap that parts no cell from a tetrahedron
-
-  !> Corners of the outward face opposite each corner of a tetrahedron.
-  integer, parameter :: opposite(3, 4) = reshape([2, 3, 4, 1, 4, 3, 1, 2, 4, 1, 3, 2], [3, 4])
 
   !> Work arrays over the box of a body, for one thread.
   type :: cut_tets_t

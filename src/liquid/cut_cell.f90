@@ -12,7 +12,7 @@ module cut_cell_m
   implicit none
   private
   public :: cut_cell_t, cut_cell_init, load_cut_cell
-  public :: open_below, open_constant, open_slab_below, tet_share_below
+  public :: open_below, open_constant, open_slab_below
 
   real(wp), parameter :: min_piece = 1.0e-20_wp   !! of pieces that count [share]
   real(wp), parameter :: round_off = 1.0e-15_wp     !! volume below a found plane [share]

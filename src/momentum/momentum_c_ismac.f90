@@ -25,7 +25,7 @@
 !! side lets long waves grow at any Courant number, and short ones above one; linear waves decay at
 !! any Courant number in one direction from 0.70 on.
 module momentum_c_ismac_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use vectors_m, only: wrench
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: side_inflow
@@ -37,7 +37,7 @@ module momentum_c_ismac_m
   use linear_operator_m, only: linear_operator_t, identity_t
   use solve_control_m, only: solve_control_t, solve_report_t, solved
   use krylov_m, only: krylov_work_t, krylov_init, bicgstab
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: accumulator_size, no_terms, exact_add_columns, exact_totals
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -394,6 +394,7 @@ contains
     type(predictor_operator_t), intent(inout) :: op
     integer, intent(in) :: b
     real(wp) :: pull(6)
+    integer(i8) :: accumulator(accumulator_size, 6)
     integer :: l, n
 
     n = op%first(b + 1) - op%first(b)
@@ -404,7 +405,9 @@ contains
         end associate
       end associate
     end do
-    pull = exact_sums(op%work(1:n, :))
+    accumulator = spread(no_terms, 2, 6)
+    call exact_add_columns(op%work(1:n, :), accumulator)
+    call exact_totals(accumulator, pull)
   end function pull_of_walls
 
   !> The stacked components of a vector of the solver into `op%x`.

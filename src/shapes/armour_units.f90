@@ -269,7 +269,7 @@ contains
     real(wp), intent(in) :: axes(3, 3)          !! towards the shank, across, along the fluke
     type(points_t), intent(inout) :: points
     type(parts_t), intent(inout) :: parts
-    real(wp) :: w, a, ring(3, 8, 2)
+    real(wp) :: w, a, b, h, ring(3, 8, 2)
     integer :: s
 
     w = 0.5_wp*dolos_waist*height
@@ -285,12 +285,28 @@ contains
     call add_face(at_origin(octagon(axes(:, 3), axes(:, 1), axes(:, 2), -w, 2*w)), points, parts)
     call face([w, -a, -w, w, a, -w, w, a, w, w, -a, w])
     call face([-w, -a, -w, -w, a, -w, -w, a, w, -w, -a, w])
-    do s = -1, 1, 2
-      call slanted_side(real(s, wp))
+    do s = -1, 1, 2   ! the sides of the middle stretch, cut where the wedge begins
+      b = real(s, wp)*a
+      h = real(s, wp)*w
+      call face([w, b, -w, w, b, w, a, h, a, a, h, -a])
+      call face([w, b, w, a, h, w, a, h, a])
+      call face([w, b, -w, a, h, -w, a, h, -a])
+      call face([-a, h, w, a, h, w, a, h, a])
+      call face([-a, h, w, a, h, a, a, h, -a, -a, h, -w])
+      call face([-a, h, -w, a, h, -a, a, h, -w])
+      call face([-a, h, -w, -a, h, w, -w, b, w, -w, b, -w])
     end do
     call end_part(points, parts)
-    do s = -1, 1, 2
-      call wedge(real(s, wp))
+    do s = -1, 1, 2   ! wedges
+      b = real(s, wp)*a
+      h = real(s, wp)*w
+      call begin_part(parts)
+      call face([w, b, -w, w, b, w, a, h, a, a, h, -a])
+      call face([w, b, -w, w, b, w, w, h, a, w, h, -a])
+      call face([w, b, w, w, h, a, a, h, a])
+      call face([w, b, -w, w, h, -a, a, h, -a])
+      call face([w, h, a, w, h, -a, a, h, -a, a, h, a])
+      call end_part(points, parts)
     end do
   contains
     pure function at_origin(x) result(y)
@@ -307,30 +323,6 @@ contains
       call add_face(at_origin(matmul(axes, reshape(x, [3, size(x)/3]))), points, parts)
     end subroutine face
 
-    !> The sides of the middle stretch on one side, cut where the wedge begins.
-    subroutine slanted_side(s)
-      real(wp), intent(in) :: s
-
-      call face([w, s*a, -w, w, s*a, w, a, s*w, a, a, s*w, -a])
-      call face([w, s*a, w, a, s*w, w, a, s*w, a])
-      call face([w, s*a, -w, a, s*w, -w, a, s*w, -a])
-      call face([-a, s*w, w, a, s*w, w, a, s*w, a])
-      call face([-a, s*w, w, a, s*w, a, a, s*w, -a, -a, s*w, -w])
-      call face([-a, s*w, -w, a, s*w, -a, a, s*w, -w])
-      call face([-a, s*w, -w, -a, s*w, w, -w, s*a, w, -w, s*a, -w])
-    end subroutine slanted_side
-
-    subroutine wedge(s)
-      real(wp), intent(in) :: s
-
-      call begin_part(parts)
-      call face([w, s*a, -w, w, s*a, w, a, s*w, a, a, s*w, -a])
-      call face([w, s*a, -w, w, s*a, w, w, s*w, a, w, s*w, -a])
-      call face([w, s*a, w, w, s*w, a, a, s*w, a])
-      call face([w, s*a, -w, w, s*w, -a, a, s*w, -a])
-      call face([w, s*w, a, w, s*w, -a, a, s*w, -a, a, s*w, a])
-      call end_part(points, parts)
-    end subroutine wedge
   end subroutine add_fluke
 
   !> Tetrahedra and surface of a block from its parts in the fewest pieces and in finer ones.

@@ -13,7 +13,7 @@ module bed_m
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
   use polygon_m, only: clip_polygon
-  use neighbours_m, only: bins_t, bins_build
+  use neighbours_m, only: bins_build, join_points
   use surface_features_m, only: set_plane
   use surface_search_m, only: found_t, nearest_on_surface, nowhere
   use bed_surface_m, only: bed_t, make_bed_surface, make_ready
@@ -121,17 +121,28 @@ contains
     type(bed_form_t), intent(inout) :: form   !! used up
     type(bed_t), intent(out) :: bed
     character(:), allocatable, intent(out) :: message   !! empty, or what is wrong
+    integer, allocatable :: number(:)
     real(wp) :: area, spacing, extent, within(3, 2)
-    integer :: m, n
+    integer :: m, n, c(3)
 
     message = ''
     bed%origin = case%grid%origin
     bed%period = merge(case%grid%length, 0.0_wp, case%boundary%kind(1, :) == 'periodic')
     bed%checksum = form%checksum
     call repeat_form(case, form, bed)
-    call join_points(case, bed)
+    ! Corners at one place become one point; facets that shrink to a line are dropped.
+    extent = maxval(maxval(bed%point, 2) - minval(bed%point, 2))
+    call join_points(bed%point, mean_spacing(bed, near_tank(case)), same_place*extent, number, &
+      near_tank(case))
+    n = 0
+    do m = 1, size(bed%triangle, 2)
+      c = number(bed%triangle(:, m))
+      if (c(1) == c(2) .or. c(2) == c(3) .or. c(3) == c(1)) cycle
+      n = n + 1
+      bed%triangle(:, n) = c
+    end do
+    if (n < size(bed%triangle, 2)) bed%triangle = bed%triangle(:, :n)
     area = 0.0_wp
-    n = size(bed%triangle, 2)
     do m = 1, n
       associate (p => bed%point(:, bed%triangle(:, m)))
         extent = maxval(maxval(p, 2) - minval(p, 2))
@@ -184,50 +195,6 @@ contains
     end do
   end subroutine repeat_form
 
-  !> Let corners at one place be one point; facets that shrink to a line are dropped.
-  subroutine join_points(case, bed)
-    type(case_t), intent(in) :: case
-    type(bed_t), intent(inout) :: bed
-    type(bins_t) :: bins
-    integer, allocatable :: number(:)
-    real(wp), allocatable :: point(:, :)
-    real(wp) :: near
-    integer :: i, m, n, bin, p, c(3)
-
-    near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
-    n = size(bed%point, 2)
-    call bins_build(bed%point, reshape([(i, i=1, n)], [1, n]), &
-      mean_spacing(bed, near_tank(case)), bins, near, near_tank(case))
-    allocate (number(n), source=0)
-    n = 0
-    do i = 1, size(number)
-      bin = bins%number(bins%place(bed%point(:, i)))
-      do m = bins%first(bin), bins%first(bin + 1) - 1
-        p = bins%item(m)
-        if (p >= i) exit
-        if (any(abs(bed%point(:, p) - bed%point(:, i)) > near)) cycle
-        number(i) = number(p)
-        exit
-      end do
-      if (number(i) > 0) cycle
-      n = n + 1
-      number(i) = n
-    end do
-    allocate (point(3, n))
-    do i = size(number), 1, -1   ! of equal points the first one stays
-      point(:, number(i)) = bed%point(:, i)
-    end do
-    m = 0
-    do i = 1, size(bed%triangle, 2)
-      c = number(bed%triangle(:, i))
-      if (c(1) == c(2) .or. c(2) == c(3) .or. c(3) == c(1)) cycle
-      m = m + 1
-      bed%triangle(:, m) = c
-    end do
-    call move_alloc(point, bed%point)
-    if (m < size(bed%triangle, 2)) bed%triangle = bed%triangle(:, :m)
-  end subroutine join_points
-
   !> Corners of the tank and its surroundings, to which bins move points far away [m].
   pure function near_tank(case) result(corner)
     type(case_t), intent(in) :: case
@@ -266,8 +233,9 @@ contains
     low = case%grid%origin + slack
     high = case%grid%origin + case%grid%length - slack
     n = 0
-    do e = 1, size(bed%open_edge, 2)
-      p = bed%point(:, bed%open_edge(:, e))
+    do e = 1, size(bed%edge, 2)
+      if (bed%edge(4, e) > 0) cycle
+      p = bed%point(:, bed%edge(1:2, e))
       if (maxval(p(3, :)) <= low(3)) cycle
       from = 0.0_wp   ! the part of the edge inside the tank, seen from above
       to = 1.0_wp

@@ -77,6 +77,8 @@ contains
   subroutine read_heights(words, form)
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(inout) :: form
+    real(wp), parameter :: mark(*) = [-9999.0_wp, -99999.0_wp, -999999.0_wp, -32768.0_wp, &
+      -32767.0_wp, 9999.0_wp, 32767.0_wp]   !! that maps of measured ground write where none is
     character(:), allocatable :: word
     real(wp) :: first(2), spacing(2)
     integer :: n(2), i, j, k
@@ -110,7 +112,11 @@ contains
       do i = 1, n(1)
         k = i + (j - 1)*n(1)
         form%point(1:2, k) = first + real([i, j] - 1, wp)*spacing
-        call get_height(words, form%point(3, k))
+        associate (z => form%point(3, k))
+          call get_real(words, z)
+          if (any(abs(z - mark) <= 0.0_wp)) call report(words, 'is the height '//to_text(z) &
+            //' a mark of a missing one (NODATA)? Every point needs a height, fill the gaps first')
+        end associate
         if (len(words%problem) > 0) return
       end do
     end do
@@ -124,18 +130,6 @@ contains
       end do
     end do
   end subroutine read_heights
-
-  !> A height; the numbers that maps of measured ground write where there is none are asked about.
-  subroutine get_height(words, z)
-    type(words_t), intent(inout) :: words
-    real(wp), intent(out) :: z
-    real(wp), parameter :: mark(*) = [-9999.0_wp, -99999.0_wp, -999999.0_wp, -32768.0_wp, &
-      -32767.0_wp, 9999.0_wp, 32767.0_wp]
-
-    call get_real(words, z)
-    if (any(abs(z - mark) <= 0.0_wp)) call report(words, 'is the height '//to_text(z) &
-      //' a mark of a missing one (NODATA)? Every point needs a height, fill the gaps first')
-  end subroutine get_height
 
   !> Triangles between `facet` and `endfacet`.
   subroutine read_ascii_stl(words, form)

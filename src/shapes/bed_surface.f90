@@ -8,8 +8,7 @@ module bed_surface_m
   use vectors_m, only: norms
   use neighbours_m, only: bins_t, bins_build
   use edge_crossing_m, only: edge_t
-  use surface_features_m, only: pair_edges, set_plane, set_facet, edge_between, bend_of, &
-    angles_of, find_corners
+  use surface_features_m, only: find_features, set_plane, set_facet, edge_between
   use surface_search_m, only: surface_t, found_t, gather
   implicit none
   private
@@ -25,8 +24,7 @@ module bed_surface_m
     real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
     type(surface_t) :: surface                 !! what touches and is touched, as far as it is made
     integer :: n_made(2) = 0                   !! facets, edges that are
-    integer, allocatable :: edge(:, :)         !! (4, e) of `pair_edges`: bent, convex ones first
-    integer, allocatable :: open_edge(:, :)    !! (2, o) start and end of those of one facet
+    integer, allocatable :: edge(:, :)         !! (4, e) of `find_features`
     real(wp), allocatable :: point_normal(:, :)   !! (3, n) outward, of any length
     type(bins_t) :: columns                    !! the facets seen from above
     integer :: n_given = 0                     !! triangles of the file, without the repetitions
@@ -39,82 +37,33 @@ contains
   subroutine make_bed_surface(spacing, bed)
     real(wp), intent(in) :: spacing   !! of the bins: the mean side of a facet [m]
     type(bed_t), intent(inout) :: bed
-    integer, allocatable :: edge(:, :), bend(:)
     logical, allocatable :: is_corner(:)
-    real(wp), allocatable :: normal(:, :)
-    real(wp) :: p(3, 3), offset
-    integer :: c, e, f, m, n
+    integer, parameter :: first_edges = 16
+    integer :: c, f, m, n
 
     n = size(bed%triangle, 2)
-    call pair_edges(size(bed%point, 2), [(3*f - 2, f=1, n + 1)], bed%triangle, edge)
-    allocate (bed%point_normal(3, size(bed%point, 2)), source=0.0_wp)
-    allocate (normal(3, n))
-    bed%surface%low = huge(1.0_wp)
-    bed%surface%high = -huge(1.0_wp)
-    do f = 1, n
-      p = bed%point(:, bed%triangle(:, f))
-      call set_plane(p, normal(:, f), offset)
-      associate (angle => angles_of(p))
-        do c = 1, 3
-          associate (sum_here => bed%point_normal(:, bed%triangle(c, f)))
-            sum_here = sum_here + angle(c)*normal(:, f)
-          end associate
-          bed%surface%low = min(bed%surface%low, p(:, c))
-          bed%surface%high = max(bed%surface%high, p(:, c))
-        end do
-      end associate
-      bed%surface%bounding_radius = max(bed%surface%bounding_radius, maxval(norms(p)))
-    end do
-    allocate (bend(size(edge, 2)), source=0)
-    do e = 1, size(edge, 2)
-      if (edge(4, e) > 0) bend(e) = bend_of(bed%point(:, edge(1:2, e)), normal(:, edge(3:4, e)))
-    end do
-    deallocate (normal)
-    call find_corners(bed%point, edge, bend, bed%point_normal, is_corner)
-    bed%open_edge = edge(1:2, pack([(e, e=1, size(bend))], edge(4, :) == 0))
-    m = count(bend /= 0)
-    allocate (bed%edge(4, m))
-    m = 0
-    do f = 1, -1, -2   ! convex, then reentrant
-      do e = 1, size(bend)
-        if (bend(e) /= f) cycle
-        m = m + 1
-        bed%edge(:, m) = edge(:, e)
-      end do
-      if (f == 1) bed%surface%n_convex = m
-    end do
-    deallocate (edge, bend)
-    call set_lists(spacing, is_corner, bed)
-  end subroutine make_bed_surface
-
-  !> The corners that touch, bins of all, and lists without facets and edges.
-  subroutine set_lists(spacing, is_corner, bed)
-    real(wp), intent(in) :: spacing        !! of the bins [m]
-    logical, intent(in) :: is_corner(:)    !! (points)
-    type(bed_t), intent(inout) :: bed
-    integer :: c, n
-    integer, parameter :: first_edges = 16
-
     associate (surface => bed%surface)
-      n = count(is_corner)
-      surface%n_corners = n
-      allocate (surface%vertex(3, n), surface%weight(n))
-      surface%weight = 1.0_wp
-      n = 0
-      do c = 1, size(is_corner)
-        if (.not. is_corner(c)) cycle
-        n = n + 1
-        surface%vertex(:, n) = bed%point(:, c)
+      call find_features(bed%point, [(3*f - 2, f=1, n + 1)], bed%triangle, bed%edge, &
+        surface%n_convex, bed%point_normal, is_corner)
+      do f = 1, n
+        surface%bounding_radius = max(surface%bounding_radius, &
+                                      maxval(norms(bed%point(:, bed%triangle(:, f)))))
       end do
+      m = count(bed%edge(4, :) > 0)
+      call bins_build(bed%point, bed%triangle, spacing, surface%facets)
+      call bins_build(bed%point, bed%edge(1:2, :m), spacing, surface%edges)
+      surface%low = surface%facets%low
+      surface%high = surface%facets%high
+      allocate (surface%facet_at(n), surface%edge_at(m), source=0)
+      allocate (surface%edge(first_edges), surface%end_outward(3, 2, first_edges))
+      surface%vertex = bed%point(:, pack([(c, c=1, size(is_corner))], is_corner))
+      n = size(surface%vertex, 2)
+      surface%n_corners = n
+      allocate (surface%weight(n), source=1.0_wp)
       surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
       call bins_build(surface%vertex, reshape([(c, c=1, n)], [1, n]), spacing, surface%vertices)
-      call bins_build(bed%point, bed%triangle, spacing, surface%facets)
-      call bins_build(bed%point, bed%edge(1:2, :), spacing, surface%edges)
-      allocate (surface%facet_at(size(bed%triangle, 2)), surface%edge_at(size(bed%edge, 2)), &
-                source=0)
-      allocate (surface%edge(first_edges), surface%end_outward(3, 2, first_edges))
     end associate
-  end subroutine set_lists
+  end subroutine make_bed_surface
 
   !> Facets and edges whose bins meet a box: make those that are not there yet, and list them.
   subroutine make_ready(low, high, bed, found, any_order)

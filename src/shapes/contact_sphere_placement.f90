@@ -5,65 +5,44 @@
 !! names the spheres inscribed in the tetrahedra, and dense spheres (`dense_spheres_m`).
 module contact_sphere_placement_m
   use kinds_m, only: wp, pi
-  use vectors_m, only: cube_root, cross, norm
+  use vectors_m, only: cube_root, norm
+  use polygon_m, only: area_vector
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t, opposite
   implicit none
   private
-  public :: place_at_centroids, place_inscribed, height_errors
+  public :: place_in_tets, height_errors
 
 contains
 
-  !> Spheres of equal volume at the centroids of the tetrahedra under the surface.
-  pure subroutine place_at_centroids(shape)
-    type(shape_t), intent(inout) :: shape
-    integer, allocatable :: tet(:)
-    real(wp) :: x(3, 4)
-    integer :: m
-
-    call find_tets_at_surface(shape, tet)
-    allocate (shape%sphere_centre(3, size(tet)), shape%sphere_radius(size(tet)))
-    do m = 1, size(tet)
-      x = shape%point(:, shape%tet(:, tet(m)))
-      shape%sphere_centre(:, m) = sum(x, 2)/4.0_wp
-      ! the sphere has the volume of the tetrahedron
-      shape%sphere_radius(m) = cube_root(0.75_wp*tet_volume(x)/pi)
-    end do
-  end subroutine place_at_centroids
-
-  !> Spheres inscribed in the tetrahedra under the surface: they touch all four faces.
+  !> A sphere for each tetrahedron that has a face on the surface.
   !!
+  !! At its centroid with its volume, or inscribed, touching all four faces:
   !! $$ r = 3 V/\sum_a A_a, \quad c = \sum_a A_a x_a/\sum_a A_a $$ with A_a the face opposite x_a.
-  pure subroutine place_inscribed(shape)
+  pure subroutine place_in_tets(inscribed, shape)
+    logical, intent(in) :: inscribed
     type(shape_t), intent(inout) :: shape
     integer, allocatable :: tet(:)
-    real(wp) :: x(3, 4), y(3, 3), area(4)
+    logical :: at_surface(size(shape%tet, 2))
+    real(wp) :: x(3, 4), area(4)
     integer :: m, a
 
-    call find_tets_at_surface(shape, tet)
+    at_surface = .false.
+    at_surface(shape%triangle_tet) = .true.
+    tet = pack([(m, m=1, size(at_surface))], at_surface)
     allocate (shape%sphere_centre(3, size(tet)), shape%sphere_radius(size(tet)))
     do m = 1, size(tet)
       x = shape%point(:, shape%tet(:, tet(m)))
-      do a = 1, 4
-        y = x(:, opposite(:, a))
-        area(a) = 0.5_wp*norm(cross(y(:, 2) - y(:, 1), y(:, 3) - y(:, 1)))
-      end do
-      shape%sphere_centre(:, m) = matmul(x, area)/sum(area)
-      shape%sphere_radius(m) = 3.0_wp*tet_volume(x)/sum(area)
+      if (inscribed) then
+        area = [(norm(area_vector(x(:, opposite(:, a)))), a=1, 4)]
+        shape%sphere_centre(:, m) = matmul(x, area)/sum(area)
+        shape%sphere_radius(m) = 3.0_wp*tet_volume(x)/sum(area)
+      else
+        shape%sphere_centre(:, m) = sum(x, 2)/4.0_wp
+        shape%sphere_radius(m) = cube_root(0.75_wp*tet_volume(x)/pi)
+      end if
     end do
-  end subroutine place_inscribed
-
-  !> Numbers of the tetrahedra that have a face on the surface.
-  pure subroutine find_tets_at_surface(shape, tet)
-    type(shape_t), intent(in) :: shape
-    integer, allocatable, intent(out) :: tet(:)
-    logical, allocatable :: at_surface(:)
-    integer :: t
-
-    allocate (at_surface(size(shape%tet, 2)), source=.false.)
-    at_surface(shape%triangle_tet) = .true.
-    tet = pack([(t, t=1, size(at_surface))], at_surface)
-  end subroutine find_tets_at_surface
+  end subroutine place_in_tets
 
   !> How far the contact spheres reach short of the block, and beyond it, over all directions [m].
   !!

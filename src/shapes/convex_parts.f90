@@ -6,11 +6,11 @@
 module convex_parts_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
-  use vectors_m, only: cross
   use polyhedron_m, only: tet_volume
+  use neighbours_m, only: join_points
   implicit none
   private
-  public :: points_t, parts_t, begin_part, add_face, end_part, add_frustum
+  public :: points_t, parts_t, begin_part, add_face, end_part, add_frustum, find_or_add
   public :: tets_of_parts, net_of_parts
 
   !> A list of points, each once. Put in points that make up parts before any are cut.
@@ -115,20 +115,10 @@ contains
     do number = 1, points%n
       if (all(abs(points%x(:, number) - x) <= points%same)) return
     end do
-    call append(x, points, number)
-  end subroutine find_or_add
-
-  !> Put a point at the end of the list.
-  pure subroutine append(x, points, number)
-    real(wp), intent(in) :: x(3)
-    type(points_t), intent(inout) :: points
-    integer, intent(out) :: number
-
-    number = points%n + 1
     points%n = number
     call ensure_capacity(number, points%x)
     points%x(:, number) = x
-  end subroutine append
+  end subroutine find_or_add
 
   !> The tetrahedra of the parts, from the centre of each part to the triangles of its faces, and
   !! each of them into `fine`**3 of equal volume.
@@ -171,13 +161,18 @@ contains
         end associate
       end do
     end do
-    call cut_tets(coarse(:, :n), fine, points, tet)
+    if (fine > 1) call cut_tets(coarse(:, :n), fine, points, tet)
+    if (fine == 1) tet = coarse(:, :n)
+    do k = 1, size(tet, 2)
+      if (tet_volume(points%x(:, tet(:, k))) < 0.0_wp) tet(1:2, k) = tet([2, 1], k)
+    end do
   end subroutine tets_of_parts
 
   !> Cut every tetrahedron into `fine`**3 parts of equal volume, fitting across faces.
   !!
   !! With its corners in ascending order a tetrahedron is mapped to the set
-  !! fine >= i >= j >= k >= 0, which whole cubes cut into six along their diagonal fill.
+  !! fine >= i >= j >= k >= 0, which whole cubes cut into six along their diagonal fill. Neighbours
+  !! find the same bits of a point because their corners come in the same order.
   pure subroutine cut_tets(coarse, fine, points, tet)
     integer, intent(in) :: coarse(:, :)
     integer, intent(in) :: fine
@@ -185,23 +180,15 @@ contains
     integer, allocatable, intent(out) :: tet(:, :)
     integer, parameter :: order(3, 6) = reshape([1, 2, 3, 1, 3, 2, 2, 1, 3, 2, 3, 1, 3, 1, 2, &
                                                  3, 2, 1], [3, 6])
-    integer, allocatable :: head(:), next(:)   ! points by their hash
-    integer :: corner(4), number(0:fine, 0:fine, 0:fine), step(3, 4), t, i, j, k, m, v, n, rest(4)
+    real(wp), allocatable :: x(:, :)   ! with the points of each tetrahedron
+    integer, allocatable :: place(:)
+    integer :: corner(4), number(0:fine, 0:fine, 0:fine), step(3, 4), weight(4), rest(4)
+    integer :: t, i, j, k, m, v, n, p
 
-    if (fine == 1) then
-      tet = coarse
-      do t = 1, size(tet, 2)
-        call make_positive(points, tet(:, t))
-      end do
-      return
-    end if
     allocate (tet(4, size(coarse, 2)*fine**3))
-    n = points%n + size(coarse, 2)*((fine + 1)*(fine + 2)*(fine + 3))/6
-    allocate (head(0:2*n), next(n))
-    head = 0
-    do i = 1, points%n
-      call enter(points, i, head, next)
-    end do
+    p = points%n
+    allocate (x(3, p + size(coarse, 2)*((fine + 1)*(fine + 2)*(fine + 3))/6))
+    x(:, :p) = points%x(:, :p)
     n = 0
     do t = 1, size(coarse, 2)
       rest = coarse(:, t)
@@ -212,8 +199,14 @@ contains
       do k = 0, fine
         do j = k, fine
           do i = j, fine
-            call lattice_point(points%x(:, corner), [fine - i, i - j, j - k, k], fine, points, &
-                               head, next, number(i, j, k))
+            p = p + 1
+            number(i, j, k) = p
+            x(:, p) = 0.0_wp
+            weight = [fine - i, i - j, j - k, k]
+            do v = 1, 4
+              if (weight(v) > 0) x(:, p) = x(:, p) &
+                + (real(weight(v), wp)/real(fine, wp))*points%x(:, corner(v))
+            end do
           end do
         end do
       end do
@@ -228,75 +221,18 @@ contains
               end do
               if (any(step(1, :) < step(2, :)) .or. any(step(2, :) < step(3, :))) cycle
               n = n + 1
-              do v = 1, 4
-                tet(v, n) = number(step(1, v), step(2, v), step(3, v))
-              end do
-              call make_positive(points, tet(:, n))
+              tet(:, n) = [(number(step(1, v), step(2, v), step(3, v)), v=1, 4)]
             end do
           end do
         end do
       end do
     end do
+    call join_points(x, maxval(maxval(x, 2) - minval(x, 2))/real(p, wp)**(1.0_wp/3.0_wp), 0.0_wp, &
+      place)
+    tet = reshape(place(reshape(tet, [4*n])), [4, n])
+    points%n = size(x, 2)
+    call move_alloc(x, points%x)
   end subroutine cut_tets
-
-  !> Swap two corners of a tetrahedron of negative volume.
-  pure subroutine make_positive(points, tet)
-    type(points_t), intent(in) :: points
-    integer, intent(inout) :: tet(4)
-
-    if (tet_volume(points%x(:, tet)) < 0.0_wp) tet(1:2) = tet([2, 1])
-  end subroutine make_positive
-
-  !> Number of the point with the given weights of four corners, added if it is new. Neighbours
-  !! find the same bits because their corners come in the same order.
-  pure subroutine lattice_point(corner, weight, fine, points, head, next, number)
-    real(wp), intent(in) :: corner(3, 4)
-    integer, intent(in) :: weight(4), fine   !! weights add up to fine
-    type(points_t), intent(inout) :: points
-    integer, intent(inout) :: head(0:), next(:)
-    integer, intent(out) :: number
-    real(wp) :: x(3)
-    integer :: v
-
-    x = 0.0_wp
-    do v = 1, 4
-      if (weight(v) > 0) x = x + (real(weight(v), wp)/real(fine, wp))*corner(:, v)
-    end do
-    number = head(hash(x, size(head)))
-    do while (number > 0)
-      if (all(abs(points%x(:, number) - x) <= 0.0_wp)) return
-      number = next(number)
-    end do
-    call append(x, points, number)
-    call enter(points, number, head, next)
-  end subroutine lattice_point
-
-  !> Enter point i under its hash.
-  pure subroutine enter(points, i, head, next)
-    type(points_t), intent(in) :: points
-    integer, intent(in) :: i
-    integer, intent(inout) :: head(0:), next(:)
-    integer :: h
-
-    h = hash(points%x(:, i), size(head))
-    next(i) = head(h)
-    head(h) = i
-  end subroutine enter
-
-  !> A number below n from the bits of a point.
-  pure function hash(x, n) result(h)
-    real(wp), intent(in) :: x(3)
-    integer, intent(in) :: n
-    integer :: h
-    integer :: word(6), i
-
-    word = transfer(x + 0.0_wp, word)   ! + 0: minus zero counts as zero
-    h = 0
-    do i = 1, 6
-      h = ieor(ishftc(h, 7), word(i))
-    end do
-    h = modulo(h, n)
-  end function hash
 
   !> The faces that belong to one part only.
   pure subroutine net_of_parts(parts, facet, facet_point)

@@ -10,6 +10,7 @@ module dense_spheres_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norms, cross, norm
+  use polygon_m, only: area_vector
   use tet_mesh_m, only: shape_t, max_facet_corners
   implicit none
   private
@@ -38,7 +39,7 @@ contains
     type(shape_t), intent(inout) :: shape
     type(facets_t) :: facets
     real(wp), allocatable :: ball(:, :)   ! (4, *) centre and radius
-    real(wp) :: polygon(3, max_clip_corners), p(3), side(3), normal(3)
+    real(wp) :: polygon(3, max_clip_corners), p(3), side(3)
     integer :: n, n_ball, m, ring, c, k, parts
 
     facets%n = size(shape%facet) - 1
@@ -51,11 +52,7 @@ contains
       associate (x => facets%x(:, :n, m))
         facets%middle(:, m) = sum(x, 2)/real(n, wp)
         facets%bounding_radius(m) = maxval(norms(x - spread(facets%middle(:, m), 2, n)))
-        normal = 0.0_wp
-        do k = 2, n - 1
-          normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))
-        end do
-        facets%normal(:, m) = normal/norm(normal)
+        facets%normal(:, m) = area_vector(x)/norm(area_vector(x))
       end associate
     end do
     allocate (ball(4, 64))

@@ -5,7 +5,8 @@
 module mass_properties_m
   use kinds_m, only: wp
   use polyhedron_m, only: tet_volume
-  use vectors_m, only: cross, norm
+  use vectors_m, only: norm
+  use polygon_m, only: area_vector
   implicit none
   private
   public :: volume_and_centroid, inertia_about_origin, surface_area
@@ -70,10 +71,7 @@ contains
 
     area = 0.0_wp
     do t = 1, size(triangle, 2)
-      associate (p => point(:, triangle(1, t)))
-        area = area + 0.5_wp*norm(cross(point(:, triangle(2, t)) - p, &
-          point(:, triangle(3, t)) - p))
-      end associate
+      area = area + norm(area_vector(point(:, triangle(:, t))))
     end do
   end function surface_area
 

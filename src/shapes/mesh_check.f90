@@ -4,9 +4,9 @@ module mesh_check_m
   use vectors_m, only: norm
   use errors_m, only: to_text
   use polyhedron_m, only: tet_volume
-  use tet_mesh_m, only: surface_of_tets, chain_of, opposite
+  use tet_mesh_m, only: surface_of_tets
   use surface_net_m, only: edge_twins
-  use neighbours_m, only: bins_t, bins_build
+  use neighbours_m, only: join_points
   implicit none
   private
   public :: check_mesh
@@ -22,19 +22,27 @@ contains
     real(wp), allocatable, intent(inout) :: point(:, :)   !! (3, n)
     integer, allocatable, intent(inout) :: tet(:, :)      !! (4, m)
     character(:), allocatable, intent(out) :: message
-    integer, allocatable :: triangle(:, :), triangle_tet(:)
+    integer, allocatable :: triangle(:, :), triangle_tet(:), number(:)
+    real(wp), allocatable :: joined(:, :)
+    logical, allocatable :: used(:)
     integer :: n, i, a, b
-    real(wp) :: x(3, 4), v, longest
+    real(wp) :: x(3, 4), v, longest, extent
 
     message = ''
     if (size(tet, 2) == 0) then
       message = 'holds no tetrahedra; a surface alone has to be meshed first (tools/make_shape.py)'
       return
     end if
-    call drop_unused(point, tet)
+    allocate (used(size(point, 2)), source=.false.)
+    do i = 1, size(tet, 2)
+      used(tet(:, i)) = .true.
+    end do
+    point = point(:, pack([(i, i=1, size(used))], used))
+    number = unpack([(i, i=1, size(point, 2))], used, 0)
     ! Give every tetrahedron a positive volume; the number of those without one worth the name.
     n = 0
     do i = 1, size(tet, 2)
+      tet(:, i) = number(tet(:, i))
       x = point(:, tet(:, i))
       v = tet_volume(x)
       longest = 0.0_wp
@@ -47,12 +55,15 @@ contains
       if (v < 0.0_wp) tet(1:2, i) = tet([2, 1], i)
     end do
     if (n > 0) call add(to_text(n)//' tetrahedra are flat')
-    n = coinciding(point)
+    joined = point
+    extent = maxval(maxval(point, 2) - minval(point, 2))
+    call join_points(joined, extent/real(size(point, 2), wp)**(1.0_wp/3.0_wp), same_place*extent, &
+      number)
+    n = size(point, 2) - size(joined, 2)
     if (n > 0) call add(to_text(n)//' points stand in the place of another, join them')
-    n = overlapping_faces(size(point, 2), tet)
+    call surface_of_tets(size(point, 2), tet, triangle, triangle_tet, n)
     if (n > 0) call add('tetrahedra overlap at '//to_text(n)//' of their faces')
     if (len(message) > 0) return
-    call surface_of_tets(size(point, 2), tet, triangle, triangle_tet)
     n = bad_edges(size(point, 2), triangle)
     if (n > 0) call add('the surface meets itself along '//to_text(n)//' edges')
     n = pieces(size(point, 2), tet)
@@ -65,84 +76,6 @@ contains
       message = message//text
     end subroutine add
   end subroutine check_mesh
-
-  !> Keep the points in use, in their order.
-  pure subroutine drop_unused(point, tet)
-    real(wp), allocatable, intent(inout) :: point(:, :)
-    integer, intent(inout) :: tet(:, :)
-    integer, allocatable :: number(:)
-    integer :: i, k, n
-
-    allocate (number(size(point, 2)), source=0)
-    do i = 1, size(tet, 2)
-      number(tet(:, i)) = 1
-    end do
-    n = 0
-    do i = 1, size(number)
-      if (number(i) == 0) cycle
-      n = n + 1
-      number(i) = n
-      point(:, n) = point(:, i)
-    end do
-    point = point(:, :n)
-    do i = 1, size(tet, 2)
-      do k = 1, 4
-        tet(k, i) = number(tet(k, i))
-      end do
-    end do
-  end subroutine drop_unused
-
-  !> Points with another of lower number in the same place.
-  function coinciding(point) result(n)
-    real(wp), intent(in) :: point(:, :)
-    integer :: n
-    type(bins_t) :: bins
-    logical, allocatable :: doubled(:)   ! a point may stand in several bins
-    real(wp) :: extent, near
-    integer :: c, i, j
-
-    extent = maxval(maxval(point, 2) - minval(point, 2))
-    near = same_place*extent
-    call bins_build(point - 0.5_wp*near, point + 0.5_wp*near, &
-                    extent/real(size(point, 2), wp)**(1.0_wp/3.0_wp), bins)
-    allocate (doubled(size(point, 2)), source=.false.)
-    do c = 1, size(bins%first) - 1
-      do i = bins%first(c) + 1, bins%first(c + 1) - 1
-        do j = bins%first(c), i - 1
-          if (all(abs(point(:, bins%item(i)) - point(:, bins%item(j))) <= near)) then
-            doubled(bins%item(i)) = .true.
-            exit
-          end if
-        end do
-      end do
-    end do
-    n = count(doubled)
-  end function coinciding
-
-  !> Faces with two tetrahedra on the same side; of three at one face two are.
-  pure function overlapping_faces(n_point, tet) result(n)
-    integer, intent(in) :: n_point
-    integer, intent(in) :: tet(:, :)
-    integer :: n
-    integer, allocatable :: face(:, :), next(:), head(:)
-    integer :: f, g, m
-
-    allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)))
-    allocate (head(n_point), source=0)
-    n = 0
-    do f = 1, size(face, 2)
-      face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
-      face(:, f) = cshift(face(:, f), minloc(face(:, f), 1) - 1)
-      m = chain_of(face(:, f), n_point)
-      g = head(m)
-      do while (g > 0)
-        if (all(face(:, g) == face(:, f))) n = n + 1
-        g = next(g)
-      end do
-      next(f) = head(m)
-      head(m) = f
-    end do
-  end function overlapping_faces
 
   !> Edges of the surface that do not join just two triangles. They lead from triangle to triangle
   !! both ways equally often, so one way is enough.

@@ -4,7 +4,7 @@ module neighbours_m
   use growing_m, only: ensure_capacity
   implicit none
   private
-  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
+  public :: bins_t, bins_build, join_points, pair_list_t, near_pairs, nearest_shift
   public :: sort_bodies, add_neighbours
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
@@ -36,7 +36,7 @@ module neighbours_m
 contains
 
   !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
-  subroutine bins_of_boxes(low, high, size_wanted, bins)
+  pure subroutine bins_of_boxes(low, high, size_wanted, bins)
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
     real(wp), intent(in) :: size_wanted             !! [m]
     type(bins_t), intent(out) :: bins
@@ -51,7 +51,7 @@ contains
   !!
   !! The size grows where the block would hold more than `max_bins`, or where large boxes would be
   !! listed in too many bins.
-  subroutine bins_of_sets(point, set, size_wanted, bins, more, within)
+  pure subroutine bins_of_sets(point, set, size_wanted, bins, more, within)
     real(wp), intent(in) :: point(:, :)         !! (3, points) [m]
     integer, intent(in) :: set(:, :)            !! (points of each, items) numbers of points
     real(wp), intent(in) :: size_wanted         !! [m]
@@ -142,7 +142,7 @@ contains
   end function entries
 
   !> List every box in the bins it meets.
-  subroutine fill_bins(point, set, more, within, bins)
+  pure subroutine fill_bins(point, set, more, within, bins)
     real(wp), intent(in) :: point(:, :), more, within(3, 2)   !! as in `bins_of_sets`
     integer, intent(in) :: set(:, :)
     type(bins_t), intent(inout) :: bins
@@ -194,6 +194,34 @@ contains
     c = p(1) + self%n(1)*(p(2) - 1 + self%n(2)*(p(3) - 1))
   end function bins_number
 
+  !> Let points at one place be one point: the first of them stays, in their order.
+  pure subroutine join_points(point, spacing, near, number, within)
+    real(wp), allocatable, intent(inout) :: point(:, :)   !! (3, points) [m]
+    real(wp), intent(in) :: spacing               !! of the points, about [m]
+    real(wp), intent(in) :: near                  !! points nearer in x, y and z are one [m]
+    integer, allocatable, intent(out) :: number(:)   !! (points before) of those that stay
+    real(wp), intent(in), optional :: within(3, 2)   !! see `bins_of_sets` [m]
+    type(bins_t) :: bins
+    logical, allocatable :: first(:)
+    integer :: i, m, n, bin
+
+    allocate (number(size(point, 2)), first(size(point, 2)))
+    call bins_of_sets(point, reshape([(i, i=1, size(number))], [1, size(number)]), spacing, bins, &
+      near, within)
+    n = 0
+    do i = 1, size(number)
+      bin = bins%number(bins%place(point(:, i)))
+      do m = bins%first(bin), bins%first(bin + 1) - 1
+        if (all(abs(point(:, bins%item(m)) - point(:, i)) <= near)) exit
+      end do
+      first(i) = bins%item(m) == i
+      if (first(i)) n = n + 1
+      number(i) = n
+      if (.not. first(i)) number(i) = number(bins%item(m))
+    end do
+    point = point(:, pack([(i, i=1, size(number))], first))
+  end subroutine join_points
+
   !> All pairs of active bodies closer than the sum of their radii plus `skin`.
   !!
   !! Work grows with the number of bodies, not of pairs. Of a periodic direction only the nearest
@@ -242,7 +270,13 @@ contains
               shift = nearest_shift(period, d)
               d = d + shift
               if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) then
-                call add_pair(a, b, shift, pairs)
+                pairs%n = pairs%n + 1
+                call ensure_capacity(pairs%n, pairs%a)
+                call ensure_capacity(pairs%n, pairs%b)
+                call ensure_capacity(pairs%n, pairs%shift)
+                pairs%a(pairs%n) = a
+                pairs%b(pairs%n) = b
+                pairs%shift(:, pairs%n) = shift
               end if
             end if
             b = pairs%chain(b)
@@ -323,20 +357,5 @@ contains
       pairs%head(c) = a
     end do
   end subroutine sort_bodies
-
-  !> Append a pair to the list.
-  subroutine add_pair(a, b, shift, pairs)
-    integer, intent(in) :: a, b
-    real(wp), intent(in) :: shift(3)
-    type(pair_list_t), intent(inout) :: pairs
-
-    pairs%n = pairs%n + 1
-    call ensure_capacity(pairs%n, pairs%a)
-    call ensure_capacity(pairs%n, pairs%b)
-    call ensure_capacity(pairs%n, pairs%shift)
-    pairs%a(pairs%n) = a
-    pairs%b(pairs%n) = b
-    pairs%shift(:, pairs%n) = shift
-  end subroutine add_pair
 
 end module neighbours_m

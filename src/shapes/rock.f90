@@ -18,7 +18,7 @@ module rock_m
   use tet_mesh_m, only: shape_t
   implicit none
   private
-  public :: build_rock, rock_mass, share_above, share_in_grade
+  public :: build_rock, rock_mass, share_in_grade
 
   integer, parameter :: n_edges = 4                  !! edges of the cube cut off, of 12
   integer, parameter :: n_planes = 6 + 8 + n_edges   !! faces, corners, edges of the cube

@@ -9,10 +9,11 @@ module shapes_builtin_m
   use named_files_m, only: found_file
   use tet_mesh_m, only: shape_t, surface_of_tets
   use vectors_m, only: cube_root, norm, norms, cross
+  use convex_parts_m, only: points_t, find_or_add
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
   use rock_m, only: build_rock, share_in_grade
-  use contact_sphere_placement_m, only: place_at_centroids, place_inscribed
+  use contact_sphere_placement_m, only: place_in_tets
   use dense_spheres_m, only: place_densely
   use shape_file_m, only: read_shape_file
   use mesh_check_m, only: check_mesh
@@ -21,7 +22,7 @@ module shapes_builtin_m
   use errors_m, only: to_text
   implicit none
   private
-  public :: make_shape, given_size, max_refinement
+  public :: make_shape, given_size
 
   integer, parameter :: max_refinement = 8
   real(wp), parameter :: max_cuboids = 1.0e5_wp   !! cuboids of a box
@@ -66,23 +67,34 @@ contains
     if (input%member > 0) shape%family = input%name
     shape%kind = input%kind
     shape%density = input%density
-    if (trim(input%kind) == 'file') then
-      call build_from_file(input, shape, message)
-      if (len(message) > 0) return
-    else if (trim(input%kind) == 'rock') then
-      call build_stone(input, shape, message)
-      if (len(message) > 0) return
-    else
-      call build_form(input, shape)
-    end if
-    ! Mass, surface and, where the flow has no coarser parts, its parts. The sums over the fewest
-    ! tetrahedra have the least round-off.
+    select case (trim(input%kind))
+    case ('file'); call build_from_file(input, shape, message)
+    case ('rock'); call build_stone(input, shape, message)
+    case default; call build_form(input, shape)
+    end select
+    if (len(message) > 0) return
+    ! Surface and, where the flow has no coarser parts, its parts: flat regions of a file become
+    ! single facets.
     call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
     if (.not. allocated(shape%flow_tet)) then
       shape%flow_tet = shape%tet
       shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
       shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+      if (trim(input%kind) == 'file') call merge_flat_facets(shape%point, shape%facet, &
+        shape%facet_point)
     end if
+    if (shape%smallest_edge <= 0.0_wp) then   ! of the cube with the same volume over surface
+      call volume_and_centroid(shape%point, shape%tet, shape%volume, centroid)
+      shape%smallest_edge = 6.0_wp*shape%volume/surface_area(shape%point, shape%triangle)
+    end if
+    if (trim(input%kind) == 'rock' .and. &
+        (shape%smallest_edge < shortest .or. shape%smallest_edge > longest)) then
+      message = given_size(input)//': the stone '//trim(shape%name)//' is ' &
+        //to_text(shape%smallest_edge)//' m thick, it must be between '//to_text(shortest) &
+        //' and '//to_text(longest)//' m'
+      return
+    end if
+    ! Mass: the sums over the fewest tetrahedra have the least round-off.
     call volume_and_centroid(shape%point, shape%flow_tet, shape%volume, centroid)
     shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
     shape%inertia = inertia_about_origin(shape%point, shape%flow_tet, shape%density)
@@ -122,22 +134,18 @@ contains
       call place_densely(spacing, shape)
       if (size(shape%sphere_radius) == 0) message = 'sphere_spacing = '//to_text(spacing) &
         //': no contact sphere finds room, it must be smaller'
-    case ('inscribed')
-      call place_inscribed(shape)
-    case ('centroid')
-      call place_at_centroids(shape)
+    case ('inscribed', 'centroid')
+      call place_in_tets(trim(input%spheres) == 'inscribed', shape)
     case default; error stop 'place_spheres: no such contact spheres'
     end select
   end subroutine place_spheres
 
-  !> Tetrahedra of a file, in its axes. Flat regions of the surface become single facets; the
-  !! smallest edge is that of the cube with the same volume over surface.
+  !> Tetrahedra of a file, in its axes.
   subroutine build_from_file(input, shape, message)
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(inout) :: shape
     character(:), allocatable, intent(out) :: message
     real(wp) :: extent
-    integer :: m
 
     call read_shape_file(found_file(input%file), shape%point, shape%tet, message)
     if (len(message) == 0) call check_mesh(shape%point, shape%tet, message)
@@ -151,14 +159,7 @@ contains
       message = 'scale = '//to_text(input%scale)//': the block of '//quoted_text(input%file) &
         //' is '//to_text(extent)//' m long, it must be between '//to_text(shortest)//' and ' &
         //to_text(longest)//' m'
-      return
     end if
-    shape%flow_tet = shape%tet
-    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
-    shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
-    shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
-    call merge_flat_facets(shape%point, shape%facet, shape%facet_point)
-    call find_smallest_edge(shape)
   end subroutine build_from_file
 
   !> A stone of a family.
@@ -168,6 +169,7 @@ contains
     character(:), allocatable, intent(out) :: message
     logical :: found
 
+    message = ''
     if (.not. share_in_grade(input) >= min_share) then
       message = 'mass_min = '//to_text(input%mass_min)//', mass_max = '//to_text(input%mass_max) &
         //': leave '//to_text(max(share_in_grade(input), 0.0_wp))//' of the stones of mass_50 = ' &
@@ -176,27 +178,9 @@ contains
       return
     end if
     call build_rock(input, shape, found)
-    if (.not. found) then
-      message = 'blockiness = '//to_text(input%blockiness)//': no stone '//trim(shape%name) &
-        //' of this blockiness was found; try another seed'
-      return
-    end if
-    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
-    call find_smallest_edge(shape)
-    message = ''
-    if (shape%smallest_edge < shortest .or. shape%smallest_edge > longest) message = &
-      given_size(input)//': the stone '//trim(shape%name)//' is '//to_text(shape%smallest_edge) &
-      //' m thick, it must be between '//to_text(shortest)//' and '//to_text(longest)//' m'
+    if (.not. found) message = 'blockiness = '//to_text(input%blockiness)//': no stone ' &
+      //trim(shape%name)//' of this blockiness was found; try another seed'
   end subroutine build_stone
-
-  !> Of a form that names none: the edge of the cube with the same volume over surface.
-  subroutine find_smallest_edge(shape)
-    type(shape_t), intent(inout) :: shape
-    real(wp) :: volume, centroid(3)
-
-    call volume_and_centroid(shape%point, shape%tet, volume, centroid)
-    shape%smallest_edge = 6.0_wp*volume/surface_area(shape%point, shape%triangle)
-  end subroutine find_smallest_edge
 
   !> Points, tetrahedra, facets and smallest edge of a block.
   subroutine build_form(input, shape)
@@ -428,33 +412,36 @@ contains
     integer, intent(in) :: frequency        !! parts of an edge of the icosahedron
     type(shape_t), intent(inout) :: shape
     real(wp) :: vertex(3, 12), direction(3), volume
-    real(wp) :: point(3, 10*frequency**2 + 3)
-    integer :: face(3, 20), number(0:frequency, 0:frequency), n_point, n_tet, f, i, j
+    real(wp), parameter :: same = 1.0e-8_wp   !! far below the spacing of the points [-]
+    type(points_t) :: points
+    integer :: face(3, 20), number(0:frequency, 0:frequency), centre, n_tet, f, i, j
 
     call make_icosahedron(vertex, face)
-    point(:, 1) = 0.0_wp
-    n_point = 1
+    points%same = same
+    call find_or_add([0.0_wp, 0.0_wp, 0.0_wp], points, centre)
     n_tet = 0
     allocate (shape%tet(4, 20*frequency**2))
     do f = 1, 20
       do j = 0, frequency
         do i = 0, frequency - j
           direction = matmul(vertex(:, face(:, f)), real([frequency - i - j, i, j], wp))
-          call find_or_add(direction/norm(direction), point, n_point, number(i, j))
+          call find_or_add(direction/norm(direction), points, number(i, j))
         end do
       end do
       do j = 0, frequency - 1
         do i = 0, frequency - j - 1
           n_tet = n_tet + 1
-          shape%tet(:, n_tet) = [1, number(i, j), number(i + 1, j), number(i, j + 1)]
+          shape%tet(:, n_tet) = [centre, number(i, j), number(i + 1, j), number(i, j + 1)]
           if (i + j == frequency - 1) cycle
           n_tet = n_tet + 1
-          shape%tet(:, n_tet) = [1, number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]
+          shape%tet(:, n_tet) = [centre, number(i + 1, j), number(i + 1, j + 1), &
+            number(i, j + 1)]
         end do
       end do
     end do
-    call volume_and_centroid(point, shape%tet, volume, direction)
-    shape%point = point*(radius*cube_root(4.0_wp*pi/(3.0_wp*volume)))
+    shape%point = points%x(:, :points%n)
+    call volume_and_centroid(shape%point, shape%tet, volume, direction)
+    shape%point = shape%point*(radius*cube_root(4.0_wp*pi/(3.0_wp*volume)))
   end subroutine build_sphere
 
   !> Corners (edge 2) and outward faces of an icosahedron.
@@ -493,21 +480,5 @@ contains
       joined = norm(vertex(:, i) - vertex(:, j)) < 2.1_wp
     end function joined
   end subroutine make_icosahedron
-
-  !> Number of a point of the unit sphere, added to the list if it is new.
-  pure subroutine find_or_add(x, point, n_point, number)
-    real(wp), intent(in) :: x(3)
-    real(wp), intent(inout) :: point(:, :)
-    integer, intent(inout) :: n_point
-    integer, intent(out) :: number
-    real(wp), parameter :: same = 1.0e-8_wp   !! far below the spacing of the points [-]
-
-    do number = 2, n_point
-      if (maxval(abs(point(:, number) - x)) < same) return
-    end do
-    n_point = n_point + 1
-    number = n_point
-    point(:, number) = x
-  end subroutine find_or_add
 
 end module shapes_builtin_m

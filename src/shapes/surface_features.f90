@@ -6,14 +6,14 @@
 module surface_features_m
   use kinds_m, only: wp
   use vectors_m, only: norms, cross, norm
+  use polygon_m, only: area_vector
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_build
   use surface_search_m, only: surface_t, found_t, search_surface
   use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_init, pair_edges, set_plane, set_facet, edge_between, bend_of, angles_of, &
-    find_corners
+  public :: surface_init, pair_edges, find_features, set_plane, set_facet, edge_between
 
   real(wp), parameter :: sharp = 1.0e-3_wp     !! sine by which facets differ at a sharp edge: more
     !! than by the digits of a file, less than on a smooth form that is cut finely
@@ -29,10 +29,10 @@ contains
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(out) :: surface
     logical, intent(in), optional :: with_net   !! default: yes
-    integer, allocatable :: edge(:, :), bend(:)
+    integer, allocatable :: edge(:, :)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: is_corner(:)
-    integer :: e, f
+    integer :: e, m
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -45,21 +45,15 @@ contains
     end if
     surface%length = 0.25_wp*shape%smallest_edge
     call make_facets(shape, surface)
-    call pair_edges(size(shape%point, 2), shape%facet, shape%facet_point, edge)
-    allocate (point_normal(3, size(shape%point, 2)), source=0.0_wp)
-    do f = 1, size(surface%normal, 2)
-      associate (c => corners(shape, f), normal => surface%normal(:, f))
-        point_normal(:, c) = point_normal(:, c) + spread(normal, 2, size(c)) &
-          *spread(angles_of(shape%point(:, c)), 1, 3)
-      end associate
+    call find_features(shape%point, shape%facet, shape%facet_point, edge, surface%n_convex, &
+      point_normal, is_corner)
+    m = count(edge(4, :) > 0)
+    surface%edge_number = [(e, e=1, m)]
+    allocate (surface%edge(m), surface%end_outward(3, 2, m))
+    do e = 1, m
+      surface%edge(e) = edge_between(shape%point(:, edge(1:2, e)), surface%normal(:, edge(3:4, e)))
+      surface%end_outward(:, :, e) = point_normal(:, edge(1:2, e))
     end do
-    allocate (bend(size(edge, 2)), source=0)
-    do e = 1, size(edge, 2)
-      if (edge(4, e) > 0) bend(e) = bend_of(shape%point(:, edge(1:2, e)), &
-        surface%normal(:, edge(3:4, e)))
-    end do
-    call find_corners(shape%point, edge, bend, point_normal, is_corner)
-    call make_edges(shape, edge, bend, point_normal, surface)
     call make_vertices(shape, is_corner, surface)
     call sort_into_bins(shape, surface)
     if (present(with_net)) then
@@ -67,6 +61,43 @@ contains
     end if
     call make_net(surface)
   end subroutine surface_init
+
+  !> What of a net of facets touches: edges that are not flat, and corners; and the outward
+  !! directions at its points.
+  pure subroutine find_features(point, first, corner, edge, n_convex, point_normal, is_corner)
+    real(wp), intent(in) :: point(:, :)             !! (3, points) [m]
+    integer, intent(in) :: first(:)
+    integer, intent(in) :: corner(first(size(first)) - 1)   !! see `pair_edges`
+    integer, allocatable, intent(out) :: edge(:, :)
+      !! (4, edges) of `pair_edges`: sharp convex ones first, those of one facet last
+    integer, intent(out) :: n_convex                !! the sharp convex ones
+    real(wp), allocatable, intent(out) :: point_normal(:, :)   !! (3, points) of any length
+    logical, allocatable, intent(out) :: is_corner(:)          !! (points)
+    integer, allocatable :: pair(:, :), bend(:), e(:)
+    real(wp), allocatable :: normal(:, :)
+    real(wp) :: offset
+    integer :: f, n
+
+    allocate (normal(3, size(first) - 1), point_normal(3, size(point, 2)))
+    point_normal = 0.0_wp
+    do f = 1, size(first) - 1
+      associate (c => corner(first(f):first(f + 1) - 1))
+        call set_plane(point(:, c), normal(:, f), offset)
+        point_normal(:, c) = point_normal(:, c) + spread(normal(:, f), 2, size(c)) &
+          *spread(angles_of(point(:, c)), 1, 3)
+      end associate
+    end do
+    call pair_edges(size(point, 2), first, corner, pair)
+    n = size(pair, 2)
+    allocate (bend(n), source=0)
+    do f = 1, n
+      if (pair(4, f) > 0) bend(f) = bend_of(point(:, pair(1:2, f)), normal(:, pair(3:4, f)))
+    end do
+    call find_corners(point, pair, bend, point_normal, is_corner)
+    n_convex = count(bend > 0)
+    e = [(f, f=1, n)]
+    edge = pair(:, [pack(e, bend > 0), pack(e, bend < 0), pack(e, pair(4, :) == 0)])
+  end subroutine find_features
 
   !> Planes and sides of the facets.
   pure subroutine make_facets(shape, surface)
@@ -140,18 +171,6 @@ contains
     p = shape%facet_point(shape%facet(f):shape%facet(f + 1) - 1)
   end function corners
 
-  !> Area of a facet times its outward unit normal [m2].
-  pure function area_vector(p) result(area)
-    real(wp), intent(in) :: p(:, :)   !! as in `set_facet`
-    real(wp) :: area(3)
-    integer :: c
-
-    area = 0.0_wp
-    do c = 2, size(p, 2) - 1
-      area = area + 0.5_wp*cross(p(:, c) - p(:, 1), p(:, c + 1) - p(:, 1))
-    end do
-  end function area_vector
-
   !> Edges of the net of facets, each once: start, end, the facet that runs it that way, the other.
   pure subroutine pair_edges(n_points, first, corner, edge)
     integer, intent(in) :: n_points, first(:)
@@ -215,30 +234,6 @@ contains
     end do
   end subroutine find_corners
 
-  !> The edges that are not flat.
-  pure subroutine make_edges(shape, edge, bend, point_normal, surface)
-    type(shape_t), intent(in) :: shape
-    integer, intent(in) :: edge(:, :), bend(:)    !! (4, edges), (edges)
-    real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
-    type(surface_t), intent(inout) :: surface
-    integer :: e, m, wanted
-
-    m = count(bend /= 0)
-    allocate (surface%edge(m), surface%end_outward(3, 2, m))
-    surface%n_convex = count(bend > 0)
-    m = 0
-    do wanted = 1, -1, -2   ! convex, then reentrant
-      do e = 1, size(edge, 2)
-        if (bend(e) /= wanted) cycle
-        m = m + 1
-        surface%end_outward(:, :, m) = point_normal(:, edge(1:2, e))
-        surface%edge(m) = edge_between(shape%point(:, edge(1:2, e)), &
-          surface%normal(:, edge(3:4, e)))
-      end do
-    end do
-    surface%edge_number = [(e, e=1, m)]
-  end subroutine make_edges
-
   !> The edge between two facets.
   pure function edge_between(ends, normal) result(edge)
     real(wp), intent(in) :: ends(3, 2)     !! start, end [m]
@@ -293,13 +288,9 @@ contains
       if (area(f) > large*whole) n = n + size(corners(shape, f))
     end do
     allocate (surface%vertex(3, n), surface%weight(n), surface%facing(3, surface%n_corners + 1:n))
-    n = 0
-    do c = 1, size(is_corner)
-      if (.not. is_corner(c)) cycle
-      n = n + 1
-      surface%vertex(:, n) = shape%point(:, c)
-      surface%weight(n) = weight(c)
-    end do
+    n = surface%n_corners
+    surface%vertex(:, :n) = shape%point(:, pack([(c, c=1, size(is_corner))], is_corner))
+    surface%weight(:n) = pack(weight, is_corner)
     do f = 1, size(shape%facet) - 1
       if (area(f) <= large*whole) cycle
       m = size(corners(shape, f))

@@ -3,6 +3,7 @@
 module surface_net_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
+  use polygon_m, only: area_vector
   use tet_mesh_m, only: max_facet_corners
   implicit none
   private
@@ -138,7 +139,8 @@ contains
       if (region(f) > 0) cycle
       region(f) = f
       origin = net%x(:, facet(f))
-      normal = facet_normal(net%x(:, facet(f):facet(f + 1) - 1))
+      normal = area_vector(net%x(:, facet(f):facet(f + 1) - 1))
+      normal = normal/norm(normal)
       queue(1) = f
       first = 1
       last = 1
@@ -149,7 +151,7 @@ contains
           if (region(g) > 0) cycle
           associate (x => net%x(:, facet(g):facet(g + 1) - 1))
             if (any(abs(matmul(normal, x - spread(origin, 2, size(x, 2)))) > net%near)) cycle
-            if (dot_product(facet_normal(x), normal) <= 0.0_wp) cycle
+            if (dot_product(area_vector(x), normal) <= 0.0_wp) cycle
           end associate
           region(g) = f
           last = last + 1
@@ -159,19 +161,6 @@ contains
       end do
     end do
   end subroutine find_regions
-
-  !> Unit normal of a flat polygon.
-  pure function facet_normal(x) result(normal)
-    real(wp), intent(in) :: x(:, :)
-    real(wp) :: normal(3)
-    integer :: k
-
-    normal = 0.0_wp
-    do k = 2, size(x, 2) - 1
-      normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))
-    end do
-    normal = normal/norm(normal)
-  end function facet_normal
 
   !> Chains, border edges and border lengths of all labels.
   pure subroutine gather(facet, net)

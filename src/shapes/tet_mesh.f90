@@ -5,7 +5,7 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, is_called, extreme_of_family, extent_along, surface_of_tets, chain_of, opposite
+  public :: shape_t, is_called, extreme_of_family, extent_along, surface_of_tets, opposite
   public :: max_facet_corners
 
   integer, parameter :: max_facet_corners = 48   !! of one polygon of the surface
@@ -77,56 +77,43 @@ contains
   end function extent_along
 
   !> The faces that belong to one tetrahedron only, and that tetrahedron.
-  pure subroutine surface_of_tets(n_point, tet, triangle, triangle_tet)
+  pure subroutine surface_of_tets(n_point, tet, triangle, triangle_tet, overlaps)
     integer, intent(in) :: n_point
     integer, intent(in) :: tet(:, :)                  !! (4, n), positive volume
     integer, allocatable, intent(out) :: triangle(:, :)   !! (3, m) counter-clockwise from outside
     integer, allocatable, intent(out) :: triangle_tet(:)  !! (m)
+    integer, intent(out), optional :: overlaps
+      !! faces with two tetrahedra on the same side; of three at one face two are
     integer, allocatable :: face(:, :), next(:), head(:)
     logical, allocatable :: single(:)
-    integer :: f, g, m
+    integer :: f, g, m, n
 
-    allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)), head(n_point), single(4*size(tet, 2)))
-    head = 0
+    allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)), single(4*size(tet, 2)))
+    ! Faces are chained by the sum of their corners, the same in whatever order these are: few share
+    ! it, even where all tetrahedra share a point.
+    allocate (head(n_point), source=0)
     single = .true.
+    n = 0
     do f = 1, size(face, 2)
       face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
-      m = chain_of(face(:, f), n_point)
+      m = 1 + modulo(sum(face(:, f)), n_point)
       g = head(m)
       do while (g > 0)
-        if (same_corners(face(:, f), face(:, g))) then
-          single(f) = .false.
-          single(g) = .false.
+        if (all([any(face(1, f) == face(:, g)), any(face(2, f) == face(:, g)), &
+                 any(face(3, f) == face(:, g))])) then
+          single([f, g]) = .false.
+          if (any([all(face(:, f) == face(:, g)), all(face([2, 3, 1], f) == face(:, g)), &
+                   all(face([3, 1, 2], f) == face(:, g))])) n = n + 1
         end if
         g = next(g)
       end do
       next(f) = head(m)
       head(m) = f
     end do
-    allocate (triangle(3, count(single)), triangle_tet(count(single)))
-    m = 0
-    do f = 1, size(face, 2)
-      if (.not. single(f)) cycle
-      m = m + 1
-      triangle(:, m) = face(:, f)
-      triangle_tet(m) = (f - 1)/4 + 1
-    end do
+    triangle_tet = pack([(f, f=1, size(single))], single)
+    triangle = face(:, triangle_tet)
+    triangle_tet = (triangle_tet - 1)/4 + 1
+    if (present(overlaps)) overlaps = n
   end subroutine surface_of_tets
-
-  !> One of n chains for a face, the same in whatever order its corners are; few faces share it,
-  !! even where all tetrahedra share a point.
-  pure function chain_of(corners, n) result(chain)
-    integer, intent(in) :: corners(3), n
-    integer :: chain
-
-    chain = 1 + modulo(sum(corners), n)
-  end function chain_of
-
-  pure function same_corners(a, b) result(same)
-    integer, intent(in) :: a(3), b(3)
-    logical :: same
-
-    same = any(a(1) == b) .and. any(a(2) == b) .and. any(a(3) == b)
-  end function same_corners
 
 end module tet_mesh_m
