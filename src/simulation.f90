@@ -32,7 +32,7 @@ module simulation_m
   use flow_start_m, only: start_flow
   use stage_m, only: stage_t
   use clock_m, only: clock_init
-  use run_state_m, only: run_state_t
+  use state_m, only: run_state_t
   use timers_m, only: timer
   implicit none
   private

@@ -12,7 +12,7 @@ module diagnostics_m
   use contacts_m, only: contact_report_t
   use coupling_m, only: coupling_report_t
   use rigid_body_m, only: kinetic_energy, potential_energy
-  use run_state_m, only: run_state_t
+  use state_m, only: run_state_t
   implicit none
   private
   public :: step_report_t, quantity_t, make_row, value_of

@@ -10,19 +10,24 @@ module hdf5_file_m
   use hdf5, only: H5S_SELECT_SET_F, H5S_UNLIMITED_F
   use hdf5, only: h5tclose_f, h5tcopy_f, h5tget_size_f, h5tset_size_f, h5tset_strpad_f
   use hdf5, only: H5T_C_S1, H5T_FORTRAN_S1, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, &
-    H5T_STR_NULLPAD_F
+    H5T_NATIVE_REAL, H5T_STR_NULLPAD_F
   use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root
   use hdf5_handle_m, only: h5_handle_t
   implicit none
   private
-  public :: h5_file_t, dataset_t
+  public :: h5_file_t, dataset_t, type_of
 
   integer, parameter :: max_rank = 5
 
+  !> Numbers in a file; in memory all but the single ones are doubles, which hold any integer that a
+  !! file gets.
+  integer, parameter, public :: as_double = 1, as_single = 2
+  integer, parameter, public :: as_integer = 3, as_wide = 4   !! of 32 bits; of 64, as VTK counts
+
   type :: dataset_t
     character(:), allocatable :: name, units
-    integer(hid_t) :: type = -1                  !! of its elements, in memory
+    integer(hid_t) :: type = -1, here = -1       !! of its elements in the file, in memory
     integer(hid_t) :: id = -1                    !! while it is open
     integer(hsize_t), allocatable :: extent(:)   !! x fastest; h5py shows the reverse
   end type dataset_t
@@ -30,64 +35,58 @@ module hdf5_file_m
   !> A file with its datasets.
   type, extends(h5_handle_t) :: h5_file_t
   contains
-    procedure, private :: store_reals, store_integers, store_texts
-    procedure, private :: read_reals, read_integers, read_texts
-    generic :: store => store_reals, store_integers, store_texts
+    procedure, private :: store_numbers, store_texts, read_reals, read_integers, read_texts
+    generic :: store => store_numbers, store_texts
     generic :: read => read_reals, read_integers, read_texts
-    procedure :: store_wide_integers, shape_of, new_blocks, write_block, read_block
+    procedure :: shape_of, new_blocks, write_block
     procedure :: new_dataset, find, pass_part   ! for columns
   end type h5_file_t
 
 contains
 
-  !> A whole dataset of reals with its unit; one that exists is overwritten. h5py shows the reverse
-  !! of its shape.
-  subroutine store_reals(self, name, units, a, extent)
+  !> A whole dataset of numbers with its unit; one that exists is overwritten. h5py shows the
+  !! reverse of its shape.
+  subroutine store_numbers(self, name, units, a, extent, kind)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: a(:)   !! its elements in a row
     integer, intent(in), optional :: extent(:)         !! its shape, else it is a row
+    integer, intent(in), optional :: kind              !! in the file, else `as_double`
+    type(dataset_t) :: dataset
 
-    call put(self, name, units, H5T_NATIVE_DOUBLE, shape_or(extent, size(a)), c_loc(a))
-  end subroutine store_reals
+    dataset = dataset_t(name, units, type_of(kind), H5T_NATIVE_DOUBLE, &
+                        extent=shape(a, kind=hsize_t))
+    if (present(extent)) dataset%extent = int(extent, hsize_t)
+    call put(self, dataset, c_loc(a))
+  end subroutine store_numbers
 
-  subroutine store_integers(self, name, units, a, extent)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in), target, contiguous :: a(:)
-    integer, intent(in), optional :: extent(:)
+  !> The type in a file of a kind of numbers.
+  integer(hid_t) function type_of(kind)
+    integer, intent(in), optional :: kind
 
-    call put(self, name, units, H5T_NATIVE_INTEGER, shape_or(extent, size(a)), c_loc(a))
-  end subroutine store_integers
-
-  !> Integers of 64 bits, the kind that VTK uses for numbers of points and cells.
-  subroutine store_wide_integers(self, name, units, a)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in) :: a(:)
-    integer(i8), target :: wide(size(a))
-
-    wide = int(a, i8)
-    call put(self, name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(a, kind=hsize_t), &
-             c_loc(wide))
-  end subroutine store_wide_integers
+    type_of = H5T_NATIVE_DOUBLE
+    if (.not. present(kind)) return
+    if (kind == as_single) type_of = H5T_NATIVE_REAL
+    if (kind == as_integer) type_of = H5T_NATIVE_INTEGER
+    if (kind == as_wide) type_of = h5kind_to_type(i8, H5_INTEGER_KIND)
+  end function type_of
 
   !> Texts, each as long as the longest of them.
   subroutine store_texts(self, name, units, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     character(*), intent(in), target, contiguous :: a(:)
-    integer(hid_t) :: in_file, here
+    type(dataset_t) :: dataset
     integer :: status
 
     if (self%info /= 0) return
-    call h5tcopy_f(H5T_C_S1, in_file, status)
-    call h5tset_size_f(in_file, int(maxval([1, len_trim(a)]), size_t), status)
-    call h5tset_strpad_f(in_file, H5T_STR_NULLPAD_F, status)
-    here = type_of_texts(len(a))
-    call put(self, name, units, in_file, [size(a, kind=hsize_t)], c_loc(a), here)
-    call h5tclose_f(in_file, status)
-    call h5tclose_f(here, status)
+    dataset = dataset_t(name, units, here=type_of_texts(len(a)), extent=shape(a, kind=hsize_t))
+    call h5tcopy_f(H5T_C_S1, dataset%type, status)
+    call h5tset_size_f(dataset%type, int(maxval([1, len_trim(a)]), size_t), status)
+    call h5tset_strpad_f(dataset%type, H5T_STR_NULLPAD_F, status)
+    call put(self, dataset, c_loc(a))
+    call h5tclose_f(dataset%type, status)
+    call h5tclose_f(dataset%here, status)
   end subroutine store_texts
 
   !> Texts in memory, blanks at their end.
@@ -100,38 +99,23 @@ contains
     call h5tset_size_f(type, int(length, size_t), status)
   end function type_of_texts
 
-  pure function shape_or(extent, n) result(found)
-    integer, intent(in), optional :: extent(:)
-    integer, intent(in) :: n   !! elements
-    integer(hsize_t), allocatable :: found(:)
-
-    found = [int(n, hsize_t)]
-    if (present(extent)) found = int(extent, hsize_t)
-  end function shape_or
-
   !> Write a whole dataset; of a shared file the root process fills it.
-  subroutine put(self, name, units, type, extent, data, type_here)
+  subroutine put(self, dataset, data)
     class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer(hid_t), intent(in) :: type
-    integer(hsize_t), intent(in) :: extent(:)
+    type(dataset_t), intent(inout) :: dataset
     type(c_ptr), intent(in) :: data
-    integer(hid_t), intent(in), optional :: type_here   !! in memory, if it is another one
-    type(dataset_t) :: dataset
     integer :: status
 
-    dataset = dataset_t(name, units, type, extent=extent)
-    if (self%has(name)) then
-      call h5dopen_f(self%id, name, dataset%id, status)
-      call self%check(status, 'open '//name)
+    if (self%has(dataset%name)) then
+      call h5dopen_f(self%id, dataset%name, dataset%id, status)
+      call self%check(status, 'open '//dataset%name)
     else
       call self%new_dataset(dataset, H5P_DEFAULT_F)
     end if
     if (self%info /= 0) return
-    if (product(extent) > 0 .and. (is_root() .or. .not. self%shared)) then
-      if (present(type_here)) dataset%type = type_here
-      call h5dwrite_f(dataset%id, dataset%type, data, status)
-      call self%check(status, 'write '//name)
+    if (product(dataset%extent) > 0 .and. (is_root() .or. .not. self%shared)) then
+      call h5dwrite_f(dataset%id, dataset%here, data, status)
+      call self%check(status, 'write '//dataset%name)
     end if
     call h5dclose_f(dataset%id, status)
   end subroutine put
@@ -157,13 +141,15 @@ contains
     call self%attribute(dataset%name, 'units', dataset%units)
   end subroutine new_dataset
 
-  !> All elements of a dataset, in a row; their number must be right.
-  subroutine read_reals(self, name, a)
+  !> All elements of a dataset, in a row; their number must be right. Or those of its block
+  !! `first : first + extent - 1`.
+  subroutine read_reals(self, name, a, first, extent)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
     real(wp), intent(inout), target, contiguous :: a(:)
+    integer, intent(in), optional :: first(:), extent(:)
 
-    call get(self, name, H5T_NATIVE_DOUBLE, size(a), c_loc(a))
+    call get(self, name, H5T_NATIVE_DOUBLE, size(a), c_loc(a), first, extent)
   end subroutine read_reals
 
   subroutine read_integers(self, name, a)
@@ -188,23 +174,26 @@ contains
     call h5tclose_f(here, status)
   end subroutine read_texts
 
-  !> Read a whole dataset of n elements.
-  subroutine get(self, name, type, n, data)
+  !> Read a whole dataset of n elements, or a block of it.
+  subroutine get(self, name, here, n, data, first, extent)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
-    integer(hid_t), intent(in) :: type
+    integer(hid_t), intent(in) :: here   !! type in memory
     integer, intent(in) :: n
     type(c_ptr), value :: data
+    integer, intent(in), optional :: first(:), extent(:)   !! of the block
     type(dataset_t) :: dataset
     integer :: status
 
-    dataset = dataset_t(name, '', type)
+    dataset = dataset_t(name, here=here)
     call self%find(dataset)
     if (self%info /= 0) return
-    if (product(dataset%extent) /= int(n, hsize_t)) then
+    if (present(first)) then
+      call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), data)
+    else if (product(dataset%extent) /= int(n, hsize_t)) then
       call self%fail(name//' has another size than this case needs')
     else if (n > 0) then
-      call h5dread_f(dataset%id, type, data, status)
+      call h5dread_f(dataset%id, here, data, status)
       call self%check(status, 'read '//name)
     end if
     call h5dclose_f(dataset%id, status)
@@ -214,7 +203,7 @@ contains
   !! damaged file they make the library read past its buffers.
   subroutine find(self, dataset)
     class(h5_file_t), intent(inout) :: self
-    class(dataset_t), intent(inout) :: dataset   !! its name and type say what is to be read
+    class(dataset_t), intent(inout) :: dataset   !! its name, and type in memory
     integer(size_t), parameter :: largest_number = 16   ! [B]
     integer(hsize_t) :: now(max_rank), largest(max_rank)
     integer(size_t) :: in_file, asked
@@ -238,7 +227,7 @@ contains
     call self%check(status, 'read '//dataset%name)
     if (self%info /= 0) return
     call h5tget_size_f(file_type, in_file, status)
-    call h5tget_size_f(dataset%type, asked, status)
+    call h5tget_size_f(dataset%here, asked, status)
     call h5tclose_f(file_type, status)
     if (in_file <= max(asked, largest_number)) return
     call self%fail(dataset%name//' has elements of a size that no number has')
@@ -252,7 +241,7 @@ contains
     type(dataset_t) :: dataset
     integer :: status
 
-    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
+    dataset = dataset_t(name, here=H5T_NATIVE_DOUBLE)
     call self%find(dataset)
     found = int(min(dataset%extent, int(huge(0), hsize_t)))
     if (self%info == 0) call h5dclose_f(dataset%id, status)
@@ -287,28 +276,13 @@ contains
     integer :: status
 
     if (self%info /= 0) return
-    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
+    dataset = dataset_t(name, here=H5T_NATIVE_DOUBLE)
     call h5dopen_f(self%id, name, dataset%id, status)
     call self%check(status, 'open '//name)
     call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a), &
                         self%transfer)
     if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine write_block
-
-  !> Read the block `first : first + extent - 1` of a dataset of reals.
-  subroutine read_block(self, name, first, extent, a)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: first(:), extent(:)
-    real(wp), intent(inout), target, contiguous :: a(:)
-    type(dataset_t) :: dataset
-    integer :: status
-
-    dataset = dataset_t(name, '', H5T_NATIVE_DOUBLE)
-    call self%find(dataset)
-    call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a))
-    if (self%info == 0) call h5dclose_f(dataset%id, status)
-  end subroutine read_block
 
   !> Write or read a block of a dataset that is open.
   subroutine pass_part(self, dataset, first, extent, data, transfer)
@@ -330,10 +304,10 @@ contains
     call self%check(status, 'select a part of '//dataset%name)
     if (self%info /= 0) return
     if (present(transfer)) then
-      call h5dwrite_f(dataset%id, dataset%type, data, status, here, there, transfer)
+      call h5dwrite_f(dataset%id, dataset%here, data, status, here, there, transfer)
       call self%check(status, 'write '//dataset%name)
     else
-      call h5dread_f(dataset%id, dataset%type, data, status, here, there)
+      call h5dread_f(dataset%id, dataset%here, data, status, here, there)
       call self%check(status, 'read '//dataset%name)
     end if
     call h5sclose_f(there, status)

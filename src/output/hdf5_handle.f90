@@ -46,7 +46,6 @@ module hdf5_handle_m
 
   integer, parameter :: longest_reason = 512
   logical :: started = .false.             !! is HDF5?
-  integer(hsize_t), parameter :: single_value(0) = [integer(hsize_t) ::]   ! extent of a number
 
   type :: h5_handle_t
     character(:), allocatable :: path
@@ -66,12 +65,11 @@ module hdf5_handle_m
     procedure :: flush => file_flush
     procedure :: reserve, check, fail
     procedure :: group, has, remove
-    procedure, private :: attribute_text, attribute_integer, attribute_integers, attribute_real
-    procedure, private :: attribute_reals, read_text_attribute, read_integer_attribute
-    generic :: attribute => attribute_text, attribute_integer, attribute_integers, attribute_real, &
-      attribute_reals
+    procedure, private :: attribute_text, attribute_integers, attribute_reals
+    procedure, private :: read_text_attribute, read_integer_attribute
+    generic :: attribute => attribute_text, attribute_integers, attribute_reals
     generic :: read_attribute => read_text_attribute, read_integer_attribute
-    procedure :: fixed_text_attribute, last_integer
+    procedure :: last_integer
   end type h5_handle_t
 
   !> What HDF5 notes about one level of a failed call.
@@ -330,50 +328,31 @@ contains
     call self%check(status, 'remove '//name)
   end subroutine remove
 
-  !> A text of any length as an attribute; h5py shows it as str. Any attribute that exists is
-  !! replaced.
-  subroutine attribute_text(self, object, name, value)
+  !> A text as an attribute of any length, which h5py shows as str, or of a fixed one in ASCII, the
+  !! form that VTK asks for. Any attribute that exists is replaced.
+  subroutine attribute_text(self, object, name, value, fixed)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: object, name, value
+    logical, intent(in), optional :: fixed   !! its length; else any
     character(kind=c_char), target :: letters(len(value) + 1)
-    type(c_ptr), target :: start(1)
+    type(c_ptr), target :: start
     integer(hid_t) :: text_type
     integer :: status
 
     if (self%info /= 0) return
     letters = transfer(value//c_null_char, letters)
-    start(1) = c_loc(letters)
-    call h5tcopy_f(H5T_STRING, text_type, status)
-    call h5tset_cset_f(text_type, H5T_CSET_UTF8_F, status)
-    call put_attribute(self, object, name, text_type, single_value, c_loc(start))
+    start = c_loc(letters)
+    if (present(fixed)) then
+      call h5tcopy_f(H5T_FORTRAN_S1, text_type, status)
+      call h5tset_size_f(text_type, int(len(value), size_t), status)
+      call put_attribute(self, object, name, text_type, [1_hsize_t], start)
+    else
+      call h5tcopy_f(H5T_STRING, text_type, status)
+      call h5tset_cset_f(text_type, H5T_CSET_UTF8_F, status)
+      call put_attribute(self, object, name, text_type, [1_hsize_t], c_loc(start))
+    end if
     call h5tclose_f(text_type, status)
   end subroutine attribute_text
-
-  !> A text as an attribute of fixed length in ASCII, the form that VTK asks for.
-  subroutine fixed_text_attribute(self, object, name, value)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: object, name
-    character(*), intent(in), target :: value
-    integer(hid_t) :: text_type
-    integer :: status
-
-    if (self%info /= 0) return
-    call h5tcopy_f(H5T_FORTRAN_S1, text_type, status)
-    call h5tset_size_f(text_type, int(len(value), size_t), status)
-    call put_attribute(self, object, name, text_type, single_value, c_loc(value))
-    call h5tclose_f(text_type, status)
-  end subroutine fixed_text_attribute
-
-  subroutine attribute_integer(self, object, name, value)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: object, name
-    integer, intent(in) :: value
-    integer(i8), target :: wide
-
-    wide = int(value, i8)
-    call put_attribute(self, object, name, h5kind_to_type(i8, H5_INTEGER_KIND), single_value, &
-                       c_loc(wide))
-  end subroutine attribute_integer
 
   subroutine attribute_integers(self, object, name, value)
     class(h5_handle_t), intent(inout) :: self
@@ -385,14 +364,6 @@ contains
     call put_attribute(self, object, name, h5kind_to_type(i8, H5_INTEGER_KIND), &
                        shape(value, kind=hsize_t), c_loc(wide))
   end subroutine attribute_integers
-
-  subroutine attribute_real(self, object, name, value)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: object, name
-    real(wp), intent(in), target :: value
-
-    call put_attribute(self, object, name, H5T_NATIVE_DOUBLE, single_value, c_loc(value))
-  end subroutine attribute_real
 
   !> Reals of any shape; h5py shows its reverse.
   subroutine attribute_reals(self, object, name, value, extent)
@@ -409,8 +380,8 @@ contains
     end if
   end subroutine attribute_reals
 
-  !> Create the attribute, or overwrite the one that is there, which must have the same type and
-  !! shape.
+  !> Create the attribute, a single value if it has one element, or overwrite the one that is there,
+  !! which must have the same type and shape.
   subroutine put_attribute(self, object, name, type, extent, data)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: object, name
@@ -432,8 +403,8 @@ contains
     if (exists) then
       call h5aopen_f(owner, name, id, status)
     else
-      if (size(extent) == 0) call h5screate_f(H5S_SCALAR_F, space, status)
-      if (size(extent) > 0) call h5screate_simple_f(size(extent), extent, space, status)
+      if (product(extent) == 1) call h5screate_f(H5S_SCALAR_F, space, status)
+      if (product(extent) /= 1) call h5screate_simple_f(size(extent), extent, space, status)
       call h5acreate_f(owner, name, type, space, id, status)
     end if
     call self%check(status, what)
@@ -455,7 +426,7 @@ contains
     if (self%broken .or. self%id < 0) return
     before = self%info
     self%info = 0
-    call self%attribute(object, name, value)
+    call self%attribute(object, name, [value])
     call self%flush()
     if (before /= 0) self%info = before
   end subroutine last_integer

@@ -10,7 +10,7 @@ module output_m
   use command_line_m, only: options_t
   use case_types_m, only: case_t, fluid_t, not_resolved
   use bed_m, only: bed_t
-  use run_state_m, only: run_state_t
+  use state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use table_m, only: result_file_t
   use output_folder_m, only: prepare_folder, continue_folder

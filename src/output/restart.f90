@@ -30,10 +30,8 @@ module restart_m
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
-  use run_state_m, only: run_state_t
-  use hdf5_file_m, only: h5_file_t
-  use state_m, only: list_state, state_groups
-  use state_list_m, only: state_list_t, item_t
+  use hdf5_file_m, only: h5_file_t, as_integer
+  use state_m, only: run_state_t, state_list_t, item_t, list_state, state_groups
   use file_space_m, only: bytes_for_change
   implicit none
   private
@@ -117,7 +115,7 @@ contains
       call file%reserve(list%bytes() + len(text) + len(parameters) + bytes_for_change)
     end if
     call file%attribute('/', 'format', format_name)
-    call file%attribute('/', 'format_version', format_version)
+    call file%attribute('/', 'format_version', [format_version])
     call file%attribute('/', 'version', version)
     call file%attribute('/', 'git_revision', git_revision)
     call file%attribute('/', 'namelist', text)
@@ -137,7 +135,7 @@ contains
         else if (associated(item%reals)) then
           call file%store(item%name, item%units, item%reals, item%extent)
         else
-          call file%store(item%name, '1', item%numbers(), item%extent)
+          call file%store(item%name, '1', real(item%numbers(), wp), item%extent, as_integer)
         end if
       end associate
     end do
@@ -353,7 +351,7 @@ contains
       do d = 1, item%extent(4)
         call item%part(grid, d, first, last)
         allocate (row(product(last - first + 1)), source=0.0_wp)
-        call file%read_block(item%name, [first, d], [last - first + 1, 1], row)
+        call file%read(item%name, row, [first, d], [last - first + 1, 1])
         item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d) = &
           reshape(row, last - first + 1)
         deallocate (row)

@@ -1,11 +1,10 @@
-!> A file with a table: columns, datasets that grow by rows and get one each time.
+!> A result file of a run: columns, datasets that grow by rows and get one each time.
 !!
 !! Its writer lists the columns once, in a procedure that gives each its name, unit and the values
 !! of this moment:
 !!
-!!     call file%begin(appending)
 !!     call file%column('/bodies/time', 's', t)
-!!     call file%column('/bodies/position', 'm', x)
+!!     call file%column('/bodies/position', 'm', [x], 3)
 !!
 !! The same list creates the columns (`creating`: the values only show the shape of a row), finds
 !! them in a file that goes on (`reopening`) and appends a row to each (`appending`). The first
@@ -13,21 +12,21 @@
 module table_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_null_ptr, c_associated
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use hdf5, only: hid_t, hsize_t, size_t, h5kind_to_type, H5_INTEGER_KIND
+  use hdf5, only: hid_t, hsize_t, size_t
   use hdf5, only: h5dset_extent_f, h5dget_create_plist_f, h5pclose_f
   use hdf5, only: h5pcreate_f, h5pget_chunk_f, h5pget_nfilters_f, h5pset_alloc_time_f
   use hdf5, only: h5pset_chunk_f, h5pset_deflate_f, h5pset_fill_value_f, h5pset_fletcher32_f
   use hdf5, only: h5pset_shuffle_f, h5tget_size_f
   use hdf5, only: H5D_ALLOC_TIME_EARLY_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, H5T_NATIVE_DOUBLE
-  use hdf5, only: H5T_NATIVE_INTEGER, H5T_NATIVE_REAL
+  use hdf5, only: H5T_NATIVE_REAL
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
-  use hdf5_file_m, only: h5_file_t, dataset_t
+  use hdf5_file_m, only: h5_file_t, dataset_t, type_of, as_single, as_double, as_integer
   use file_space_m, only: bytes_for_change, bytes_for_chunks
-  use run_state_m, only: run_state_t
+  use state_m, only: run_state_t
   implicit none
   private
-  public :: table_t, result_file_t, creating, reopening, appending
+  public :: result_file_t, appending
 
   integer, parameter :: creating = 1, reopening = 2, appending = 3
   integer, parameter :: deflate_level = 1      !! higher levels cost time and gain little on fields
@@ -42,8 +41,12 @@ module table_m
     integer(hsize_t), allocatable :: chunk(:)    !! shape of the pieces that are stored
   end type column_t
 
-  type :: table_t
+  !> A result file whose columns one procedure lists from the state of the run. The root process
+  !! alone writes it, unless it is shared by all.
+  type, abstract :: result_file_t
     type(h5_file_t) :: file
+    character(:), allocatable :: counter
+      !! group whose `@NSteps` counts the rows, if any does; `list_columns` sets it
     integer :: rows = 0
     integer :: chunk_bytes = 2**14     !! of a column that is not compressed
     logical :: up_to_date = .false.    !! a run that goes on has a row of its very start
@@ -51,22 +54,12 @@ module table_m
     integer, private :: at = 0         !! column that was listed last
     type(column_t), allocatable, private :: list(:)
   contains
-    procedure, private :: number, numbers, vectors, integers, wide_number, wide_numbers, next
-    generic :: column => number, numbers, vectors, integers, wide_number, wide_numbers
+    procedure, private :: number, numbers, next, pass_list, count_rows
+    generic :: column => number, numbers
     procedure :: points, cells, field
-    procedure :: begin, find_rows, keep, bytes_for_row, read_row
-  end type table_t
-
-  !> A result file of a run: a table whose columns one procedure lists from the state of the run.
-  !! The root process alone writes it, unless it is shared by all.
-  type, abstract, extends(table_t) :: result_file_t
-    character(:), allocatable :: counter
-      !! group whose `@NSteps` counts the rows, if any does; `list_columns` sets it
-  contains
     procedure(of_state), deferred :: write_head     !! all but columns
     procedure(of_state), deferred :: list_columns   !! as above
-    procedure :: create, reopen, drop, append
-    procedure, private :: count_rows
+    procedure :: create, reopen, drop, append, bytes_for_row
   end type result_file_t
 
   abstract interface
@@ -80,21 +73,23 @@ module table_m
 
 contains
 
-  !> Begin to list the columns.
-  subroutine begin(self, mode)
-    class(table_t), intent(inout) :: self
+  !> List the columns: create them, find them, or append a row to each.
+  subroutine pass_list(self, mode, state)
+    class(result_file_t), intent(inout) :: self
     integer, intent(in) :: mode   !! creating, reopening, appending
+    type(run_state_t), intent(in) :: state
 
     self%mode = mode
     self%at = 0
     if (mode /= appending) self%list = [column_t ::]
-  end subroutine begin
+    call self%list_columns(state)
+  end subroutine pass_list
 
   !> The next column: create it, find it in the file, or append a row to it.
-  subroutine next(self, name, units, type, row, data, per_row, layers)
-    class(table_t), intent(inout) :: self
+  subroutine next(self, name, units, kind, row, data, per_row, layers)
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer(hid_t), intent(in) :: type           !! of its elements
+    integer, intent(in), optional :: kind        !! of its numbers in the file, else doubles
     integer, intent(in) :: row(:)                !! its shape; empty: a number
     type(c_ptr), intent(in) :: data              !! its values; null: the caller writes them
     integer, intent(in), optional :: per_row, layers   !! as in `column_t`
@@ -106,7 +101,8 @@ contains
       call append_row(self%file, self%list(self%at), data)
       return
     end if
-    new = column_t(name=name, units=units, type=type, row=row)
+    new = column_t(name=name, units=units, type=type_of(kind), here=H5T_NATIVE_DOUBLE, row=row)
+    if (new%type == H5T_NATIVE_REAL) new%here = new%type
     if (present(per_row)) new%per_row = per_row
     if (present(layers)) new%layers = layers
     if (self%mode == reopening) call open_column(self%file, new)
@@ -115,61 +111,31 @@ contains
   end subroutine next
 
   !> A number.
-  subroutine number(self, name, units, x)
-    class(table_t), intent(inout) :: self
+  subroutine number(self, name, units, x, kind)
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     real(wp), intent(in), target :: x
+    integer, intent(in), optional :: kind   !! in the file, else `as_double`
 
-    call self%next(name, units, H5T_NATIVE_DOUBLE, [integer ::], c_loc(x))
+    call self%next(name, units, kind, [integer ::], c_loc(x))
   end subroutine number
 
-  !> Numbers, one of each block.
-  subroutine numbers(self, name, units, x)
-    class(table_t), intent(inout) :: self
+  !> Numbers or vectors, one of each block.
+  subroutine numbers(self, name, units, x, components, kind)
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     real(wp), intent(in), target, contiguous :: x(:)
+    integer, intent(in), optional :: components, kind   !! of a vector; as above
+    integer :: row(2)
 
-    call self%next(name, units, H5T_NATIVE_DOUBLE, shape(x), c_loc(x))
+    row = size(x)
+    if (present(components)) row = [components, size(x)/components]
+    call self%next(name, units, kind, row(:merge(2, 1, present(components))), c_loc(x))
   end subroutine numbers
-
-  !> Vectors, one of each block.
-  subroutine vectors(self, name, units, x)
-    class(table_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    real(wp), intent(in), target, contiguous :: x(:, :)   !! (components, blocks)
-
-    call self%next(name, units, H5T_NATIVE_DOUBLE, shape(x), c_loc(x))
-  end subroutine vectors
-
-  !> Integers, one of each block.
-  subroutine integers(self, name, units, n)
-    class(table_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer, intent(in), target, contiguous :: n(:)
-
-    call self%next(name, units, H5T_NATIVE_INTEGER, shape(n), c_loc(n))
-  end subroutine integers
-
-  !> An integer of 64 bits, the kind that VTK uses for numbers of points and cells.
-  subroutine wide_number(self, name, units, n)
-    class(table_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer(i8), intent(in), target :: n
-
-    call self%next(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), [integer ::], c_loc(n))
-  end subroutine wide_number
-
-  subroutine wide_numbers(self, name, units, n)
-    class(table_t), intent(inout) :: self
-    character(*), intent(in) :: name, units
-    integer(i8), intent(in), target, contiguous :: n(:)
-
-    call self%next(name, units, h5kind_to_type(i8, H5_INTEGER_KIND), shape(n), c_loc(n))
-  end subroutine wide_numbers
 
   !> Vectors of points, which follow one another in the file; compressed.
   subroutine points(self, name, units, single, x)
-    class(table_t), intent(inout) :: self
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     logical, intent(in) :: single     !! precision in the file
     real(wp), intent(in), target, contiguous :: x(:, :)   !! (3, points)
@@ -177,25 +143,25 @@ contains
 
     if (single) then
       allocate (short(3, size(x, 2)), source=real(x, sp))
-      call self%next(name, units, H5T_NATIVE_REAL, [3], c_loc(short), size(x, 2), 3)
+      call self%next(name, units, as_single, [3], c_loc(short), size(x, 2), 3)
     else
-      call self%next(name, units, H5T_NATIVE_DOUBLE, [3], c_loc(x), size(x, 2), 3)
+      call self%next(name, units, as_double, [3], c_loc(x), size(x, 2), 3)
     end if
   end subroutine points
 
   !> Integers of cells, which follow one another in the file.
   subroutine cells(self, name, units, n)
-    class(table_t), intent(inout) :: self
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in), target, contiguous :: n(:)
+    real(wp), intent(in), target, contiguous :: n(:)
 
-    call self%next(name, units, H5T_NATIVE_INTEGER, [integer ::], c_loc(n), size(n))
+    call self%next(name, units, as_integer, [integer ::], c_loc(n), size(n))
   end subroutine cells
 
   !> Numbers of the cells of a grid in single precision, of which this process gives a block;
   !! compressed. All processes together write them.
   subroutine field(self, name, units, whole, first, extent, a)
-    class(table_t), intent(inout) :: self
+    class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer, intent(in) :: whole(:)              !! shape of the field
     integer, intent(in) :: first(:), extent(:)   !! of the block
@@ -203,7 +169,7 @@ contains
     integer :: layers
 
     layers = max(1, field_bytes/(4*product(whole(:size(whole) - 1))))
-    call self%next(name, units, H5T_NATIVE_REAL, whole, c_null_ptr, &
+    call self%next(name, units, as_single, whole, c_null_ptr, &
                    layers=min(layers, whole(size(whole))))
     if (self%mode /= appending .or. self%file%info /= 0) return
     associate (file => self%file, column => self%list(self%at))
@@ -307,48 +273,9 @@ contains
     call file%pass_part(column, first, extent, data, H5P_DEFAULT_F)
   end subroutine append_row
 
-  !> Rows that a run keeps which goes on, those that it has counted, and one more if that one is of
-  !! this very time; later ones stay until `keep`.
-  subroutine find_rows(self, counted, time)
-    class(table_t), intent(inout) :: self
-    integer, intent(in) :: counted   !! by the run
-    real(wp), intent(in) :: time     !! [s]
-    real(wp) :: last(1)
-    integer :: row
-
-    self%rows = counted
-    self%up_to_date = .false.
-    if (self%file%info /= 0) return
-    associate (there => int(last_row(self%list(1))) + 1, file => self%file)
-      if (there < counted) then
-        file%info = 1
-        file%message = file%path//': has lost rows, the run cannot go on in it'
-      end if
-      do row = max(1, counted), min(counted + 1, there)
-        call self%read_row(self%list(1)%name, row, last)
-        if (file%info /= 0 .or. abs(last(1) - time) > 0.0_wp) cycle
-        self%rows = row
-        self%up_to_date = .true.
-      end do
-    end associate
-  end subroutine find_rows
-
-  !> Give the table so many rows.
-  subroutine keep(self, rows)
-    class(table_t), intent(inout) :: self
-    integer, intent(in) :: rows
-    integer :: c
-
-    self%rows = rows
-    if (self%file%info /= 0) return
-    do c = 1, size(self%list)
-      call resize(self%file, self%list(c), int(rows, hsize_t)*self%list(c)%per_row)
-    end do
-  end subroutine keep
-
   !> Most that another row takes at the end of the file [bytes].
   function bytes_for_row(self) result(bytes)
-    class(table_t), intent(in) :: self
+    class(result_file_t), intent(in) :: self
     integer(i8) :: bytes
     integer(i8) :: layers, before, after
     integer(size_t) :: element
@@ -370,27 +297,6 @@ contains
     end do
   end function bytes_for_row
 
-  !> Row number `row` (from 1) of a column of reals.
-  subroutine read_row(self, name, row, a)
-    class(table_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: row
-    real(wp), intent(inout), target, contiguous :: a(:)
-    integer(hsize_t), allocatable :: first(:), extent(:)
-    integer :: c
-
-    if (self%file%info /= 0 .or. size(a) == 0) return
-    do c = 1, size(self%list)
-      if (self%list(c)%name /= name) cycle
-      associate (column => self%list(c))
-        extent = [column%extent(:size(column%extent) - 1), 1_hsize_t]
-        first = 0*extent
-        first(size(first)) = int(row - 1, hsize_t)
-        call self%file%pass_part(column, first, extent, c_loc(a))
-      end associate
-    end do
-  end subroutine read_row
-
   !> Create the file without rows.
   subroutine create(self, path, shared, state)
     class(result_file_t), intent(inout) :: self
@@ -401,35 +307,55 @@ contains
     if (.not. (is_root() .or. shared)) return
     call self%file%create(path, shared)
     call self%write_head(state)
-    call self%begin(creating)
-    call self%list_columns(state)
-    if (allocated(self%counter)) call self%file%attribute(self%counter, 'NSteps', 0)
+    call self%pass_list(creating, state)
+    if (allocated(self%counter)) call self%file%attribute(self%counter, 'NSteps', [0])
     call self%file%flush()
   end subroutine create
 
-  !> Open the file of a run that goes on from `state`; nothing in it is changed yet.
+  !> Open the file of a run that goes on from `state`; nothing in it is changed yet. The run keeps
+  !! the rows that it has counted, and one more if that one is of this very time; later ones stay
+  !! until `drop`.
   subroutine reopen(self, path, shared, counted, state)
     class(result_file_t), intent(inout) :: self
     character(*), intent(in) :: path
     logical, intent(in) :: shared
-    integer, intent(in) :: counted   !! rows that the run has counted
+    integer, intent(in) :: counted   !! rows
     type(run_state_t), intent(in) :: state
+    real(wp) :: last(1)
+    integer :: row, there
 
     if (.not. (is_root() .or. shared)) return
     call self%file%open(path, shared, .true.)
-    call self%begin(reopening)
-    call self%list_columns(state)
-    call self%find_rows(counted, state%clock%t)
+    call self%pass_list(reopening, state)
+    self%rows = counted
+    self%up_to_date = .false.
+    if (self%file%info /= 0) return
+    there = int(last_row(self%list(1))) + 1
+    if (there < counted) then
+      self%file%info = 1
+      self%file%message = self%file%path//': has lost rows, the run cannot go on in it'
+    end if
+    do row = max(1, counted), min(counted + 1, there)
+      call self%file%read(self%list(1)%name, last, [row], [1])
+      if (self%file%info /= 0 .or. abs(last(1) - state%clock%t) > 0.0_wp) cycle
+      self%rows = row
+      self%up_to_date = .true.
+    end do
   end subroutine reopen
 
   !> Keep the first rows.
   subroutine drop(self, rows)
     class(result_file_t), intent(inout) :: self
     integer, intent(in) :: rows
+    integer :: c
 
     if (.not. (is_root() .or. self%file%shared)) return
     call self%count_rows(rows)
-    call self%keep(rows)
+    self%rows = rows
+    if (self%file%info /= 0) return
+    do c = 1, size(self%list)
+      call resize(self%file, self%list(c), int(rows, hsize_t)*self%list(c)%per_row)
+    end do
     call self%file%flush()
   end subroutine drop
 
@@ -442,8 +368,7 @@ contains
     if (.not. (is_root() .or. self%file%shared)) return
     if (self%rows /= rows_before) call self%drop(rows_before)
     call self%file%reserve(self%bytes_for_row())
-    call self%begin(appending)
-    call self%list_columns(state)
+    call self%pass_list(appending, state)
     self%rows = self%rows + 1
     call self%count_rows(self%rows)
   end subroutine append
@@ -455,7 +380,7 @@ contains
 
     call self%file%flush()
     if (.not. allocated(self%counter)) return
-    call self%file%attribute(self%counter, 'NSteps', rows)
+    call self%file%attribute(self%counter, 'NSteps', [rows])
     call self%file%flush()
   end subroutine count_rows
 

@@ -10,8 +10,8 @@ module write_run_m
   use rigid_body_m, only: blocks_t, own_mass
   use bed_m, only: bed_t
   use errors_m, only: exit_files
-  use run_state_m, only: run_state_t
-  use hdf5_file_m, only: h5_file_t
+  use state_m, only: run_state_t
+  use hdf5_file_m, only: h5_file_t, as_integer
   use table_m, only: result_file_t, appending
   use file_space_m, only: bytes_for_change
   use diagnostics_m, only: quantity_t
@@ -50,7 +50,8 @@ contains
     ! The surface of the bed, repeated between periodic sides; corners are counted from 0.
     call self%file%group('/bed')
     call self%file%store('/bed/points', 'm', [bed%point], shape(bed%point))
-    call self%file%store('/bed/triangles', '1', [bed%triangle - 1], shape(bed%triangle))
+    call self%file%store('/bed/triangles', '1', [real(bed%triangle - 1, wp)], &
+      shape(bed%triangle), as_integer)
     call self%file%flush()
   end subroutine create_run_file
 
@@ -63,7 +64,7 @@ contains
 
     associate (file => self%file, grid => state%grid, blocks => state%blocks)
       call file%attribute('/', 'format', 'mics-run')
-      call file%attribute('/', 'format_version', 1)
+      call file%attribute('/', 'format_version', [1])
       call file%group(here)
       call file%attribute(here, 'namelist', self%text)
       call file%attribute(here, 'parameters', self%parameters)
@@ -71,11 +72,11 @@ contains
       call file%attribute(here, 'git_revision', git_revision)
       call file%attribute(here, 'compiler', compiler)
       call file%attribute(here, 'flags', flags)
-      call file%attribute(here, 'threads', get_threads())
-      call file%attribute(here, 'ranks', nproc())
+      call file%attribute(here, 'threads', [get_threads()])
+      call file%attribute(here, 'ranks', [nproc()])
       call file%attribute(here, 'started', time_now())
       call file%attribute(here, 'finished', '')
-      call file%attribute(here, 'exit_status', running)
+      call file%attribute(here, 'exit_status', [running])
       call file%group('/grid')
       do d = 1, 3   ! the coordinates of the faces
         call file%store('/grid/'//axis(d:d), 'm', grid%face([(i, i=1, grid%n(d) + 1)], d))
@@ -84,7 +85,7 @@ contains
       call file%group('/bodies')
       call file%store('/bodies/shape', '1', blocks%shapes(blocks%shape)%name)
       call file%store('/bodies/mass', 'kg', [(own_mass(blocks, i), i=1, blocks%n)])
-      call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
+      call file%store('/bodies/fixed', '1', merge(1.0_wp, 0.0_wp, blocks%fixed), kind=as_integer)
       call file%store('/bodies/name', '1', blocks%name)
       call file%store('/bodies/planned', 'm', [blocks%planned], shape(blocks%planned))
       call store_once(blocks, .true., self)
@@ -109,17 +110,17 @@ contains
         end do
       end if
       call self%column('/bodies/time', trim(row(1)%units), row(1)%value)
-      call self%column('/bodies/position', 'm', blocks%x)
-      call self%column('/bodies/velocity', 'm/s', blocks%v)
-      call self%column('/bodies/angular_velocity', 'rad/s', blocks%omega)
-      call self%column('/bodies/fluid_force', 'N', blocks%fluid_force)
-      call self%column('/bodies/fluid_torque', 'N m', blocks%fluid_torque)
-      call self%column('/bodies/contact_force', 'N', blocks%contact_force)
-      call self%column('/bodies/contact_torque', 'N m', blocks%contact_torque)
+      call self%column('/bodies/position', 'm', [blocks%x], 3)
+      call self%column('/bodies/velocity', 'm/s', [blocks%v], 3)
+      call self%column('/bodies/angular_velocity', 'rad/s', [blocks%omega], 3)
+      call self%column('/bodies/fluid_force', 'N', [blocks%fluid_force], 3)
+      call self%column('/bodies/fluid_torque', 'N m', [blocks%fluid_torque], 3)
+      call self%column('/bodies/contact_force', 'N', [blocks%contact_force], 3)
+      call self%column('/bodies/contact_torque', 'N m', [blocks%contact_torque], 3)
       call self%column('/bodies/contact_force_max', 'N', blocks%record%hardest)
-      call self%column('/bodies/quaternion', '1', self%q)
-      call self%column('/bodies/contacts', '1', blocks%contacts)
-      call self%column('/bodies/on_floor', '1', blocks%on_floor)
+      call self%column('/bodies/quaternion', '1', [self%q], 4)
+      call self%column('/bodies/contacts', '1', real(blocks%contacts, wp), kind=as_integer)
+      call self%column('/bodies/on_floor', '1', real(blocks%on_floor, wp), kind=as_integer)
       do c = 1, size(row)
         call self%column('/series/'//trim(row(c)%name), trim(row(c)%units), row(c)%value)
       end do
@@ -150,14 +151,15 @@ contains
       associate (form => blocks%shapes(s), here => '/shapes/'//trim(blocks%shapes(s)%name))
         call file%group(here)
         call file%store(here//'/points', 'm', [form%point], shape(form%point))
-        call file%store(here//'/triangles', '1', [form%triangle - 1], shape(form%triangle))
-        call file%store(here//'/tets', '1', [form%tet - 1], shape(form%tet))
+        call file%store(here//'/triangles', '1', [real(form%triangle - 1, wp)], &
+          shape(form%triangle), as_integer)
+        call file%store(here//'/tets', '1', [real(form%tet - 1, wp)], shape(form%tet), as_integer)
         call file%store(here//'/sphere_centre', 'm', [form%sphere_centre], &
           shape(form%sphere_centre))
         call file%store(here//'/sphere_radius', 'm', form%sphere_radius)
-        call file%attribute(here, 'volume', form%volume)
+        call file%attribute(here, 'volume', [form%volume])
         call file%attribute(here, 'inertia', [form%inertia], [3, 3])
-        call file%attribute(here, 'density', form%density)
+        call file%attribute(here, 'density', [form%density])
       end associate
     end do
   end subroutine write_shapes
@@ -181,7 +183,7 @@ contains
     end do
     if (all(blocks%status == self%status) .and. .not. every) return
     self%status = blocks%status
-    call self%file%store('/bodies/status', '1', self%status)
+    call self%file%store('/bodies/status', '1', real(self%status, wp), kind=as_integer)
   end subroutine store_once
 
   !> Open the file of a run that goes on; nothing in it is changed yet.
@@ -196,8 +198,9 @@ contains
     if (.not. is_root()) return
     wall_time = 0.0_wp
     q = 0.0_wp
-    call self%read_row('/bodies/quaternion', state%clock%rows%n, q)   ! the next is like it
-    call self%read_row('/series/wall_time', self%rows, wall_time)
+    if (size(q) > 0) call self%file%read('/bodies/quaternion', q, [1, 1, state%clock%rows%n], &
+      [4, state%blocks%n, 1])   ! the next is like it
+    call self%file%read('/series/wall_time', wall_time, [self%rows], [1])
     self%q = reshape(q, [4, state%blocks%n])
     self%wall_time = wall_time(1)
   end subroutine reopen_run_file
@@ -209,13 +212,14 @@ contains
 
     if (.not. is_root()) return
     associate (file => self%file)
+      call file%reserve(bytes_for_change)
+      call self%drop(self%rows)
       call file%reserve(bytes_for_change + 2*(len(self%text) + len(self%parameters)))
-      call self%keep(self%rows)
       call store_once(blocks, .true., self)
       call file%attribute('/provenance', 'namelist', self%text)
       call file%attribute('/provenance', 'parameters', self%parameters)
       call file%attribute('/provenance', 'finished', '')
-      call file%attribute('/provenance', 'exit_status', running)
+      call file%attribute('/provenance', 'exit_status', [running])
       call file%flush()
     end associate
   end subroutine continue_run_file
@@ -232,7 +236,7 @@ contains
       call file%group('/timers')
       call file%store('/timers/name', '1', phases%name)
       call file%store('/timers/seconds', 's', phases%seconds)
-      call file%store('/timers/calls', '1', phases%calls)
+      call file%store('/timers/calls', '1', real(phases%calls, wp), kind=as_integer)
       call file%attribute('/provenance', 'finished', time_now())
       call file%last_integer('/provenance', 'exit_status', merge(exit_status, exit_files, &
         file%info == 0))

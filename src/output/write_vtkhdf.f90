@@ -7,11 +7,11 @@
 !! `Steps@NSteps` counts it, which is flushed after everything else. Source: VTK, "VTKHDF file
 !! format".
 module write_vtkhdf_m
-  use kinds_m, only: wp, sp, i8
+  use kinds_m, only: wp, sp
   use vectors_m, only: cross, rotation_matrix
   use rigid_body_m, only: blocks_t
-  use run_state_m, only: run_state_t
-  use hdf5_file_m, only: h5_file_t
+  use state_m, only: run_state_t
+  use hdf5_file_m, only: h5_file_t, as_integer, as_wide
   use file_space_m, only: bytes_for_change
   use table_m, only: result_file_t
   implicit none
@@ -60,7 +60,7 @@ contains
 
     call self%file%group(root)
     call self%file%attribute(root, 'Version', [2, 0])
-    call self%file%fixed_text_attribute(root, 'Type', kind)
+    call self%file%attribute(root, 'Type', kind, fixed=.true.)
     call self%file%group(steps)
     call self%file%group(steps//'/CellDataOffsets')
     self%chunk_bytes = frame_chunk
@@ -99,7 +99,7 @@ contains
         call self%field(cell_data//name, units, [components, grid%n], [spread(1, 1, &
           size(components)), grid%lo], [components, grid%hi - grid%lo + 1], a)
       end associate
-      call self%column(steps//'/CellDataOffsets/'//name, '1', int(self%rows, i8))
+      call self%column(steps//'/CellDataOffsets/'//name, '1', real(self%rows, wp), as_wide)
     end subroutine add
   end subroutine list_fields
 
@@ -149,14 +149,16 @@ contains
           n_points = n_points + size(shape%point, 2)
         end associate
       end do
-      call file%store_wide_integers(root//'/NumberOfPoints', '1', [n_points])
+      call file%store(root//'/NumberOfPoints', '1', [real(n_points, wp)], kind=as_wide)
       call write_cell_group(file, root//'/Polygons', corner, [(3*i, i=0, size(corner)/3)])
       do i = 1, size(other)
         call write_cell_group(file, root//'/'//trim(other(i)), [integer ::], [0])
       end do
       call file%group(root//'/CellData')
-      call file%store(cell_data//'body', '1', on_cells(blocks, [(b, b=1, blocks%n)]))
-      call file%store(cell_data//'fixed', '1', on_cells(blocks, merge(1, 0, blocks%fixed)))
+      call file%store(cell_data//'body', '1', on_cells(blocks, [(b, b=1, blocks%n)]), &
+        kind=as_integer)
+      call file%store(cell_data//'fixed', '1', on_cells(blocks, merge(1, 0, blocks%fixed)), &
+        kind=as_integer)
       call file%group(root//'/PointData')
       call file%group(steps//'/PointDataOffsets')
     end associate
@@ -170,17 +172,17 @@ contains
     integer, intent(in) :: offset(:)   !! where each cell begins, and the end
 
     call file%group(name)
-    call file%store_wide_integers(name//'/NumberOfCells', '1', [size(offset) - 1])
-    call file%store_wide_integers(name//'/NumberOfConnectivityIds', '1', [size(corner)])
-    call file%store_wide_integers(name//'/Offsets', '1', offset)
-    call file%store_wide_integers(name//'/Connectivity', '1', corner)
+    call file%store(name//'/NumberOfCells', '1', [size(offset) - 1.0_wp], kind=as_wide)
+    call file%store(name//'/NumberOfConnectivityIds', '1', [real(size(corner), wp)], kind=as_wide)
+    call file%store(name//'/Offsets', '1', real(offset, wp), kind=as_wide)
+    call file%store(name//'/Connectivity', '1', real(corner, wp), kind=as_wide)
   end subroutine write_cell_group
 
   !> A number of each block on its triangles.
   pure function on_cells(blocks, of_block) result(of_cell)
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: of_block(:)
-    integer, allocatable :: of_cell(:)
+    real(wp), allocatable :: of_cell(:)
     integer :: b, first, n(blocks%n)
 
     n = [(size(blocks%shapes(blocks%shape(b))%triangle, 2), b=1, blocks%n)]
@@ -196,14 +198,13 @@ contains
   subroutine list_surfaces(self, state)
     class(block_file_t), intent(inout) :: self
     type(run_state_t), intent(in) :: state
-    real(wp), allocatable :: x(:, :), v(:, :)   ! [m], [m/s]
-    integer, allocatable :: released(:)
+    real(wp), allocatable :: x(:, :), v(:, :), released(:)   ! [m], [m/s], [-]
     real(wp) :: arm(3), r(3, 3)
     integer :: b, i, m
 
     self%counter = steps
-    associate (blocks => state%blocks, frame => int(self%rows, i8), &
-               none => [0_i8, 0_i8, 0_i8, 0_i8])
+    associate (blocks => state%blocks, frame => real(self%rows, wp), &
+               none => spread(0.0_wp, 1, 4))
       m = sum([(size(blocks%shapes(blocks%shape(b))%point, 2), b=1, blocks%n)])
       allocate (x(3, m), v(3, m))
       m = 0
@@ -223,15 +224,15 @@ contains
       call self%points(root//'/Points', 'm', .false., x)
       call self%points(root//'/PointData/velocity', 'm/s', .true., v)
       call self%cells(cell_data//'released', '1', released)
-      call self%column(steps//'/PartOffsets', '1', 0_i8)
-      call self%column(steps//'/NumberOfParts', '1', 1_i8)
-      call self%column(steps//'/PointOffsets', '1', frame*m)
-      call self%column(steps//'/CellOffsets', '1', none)
-      call self%column(steps//'/ConnectivityIdOffsets', '1', none)
-      call self%column(steps//'/CellDataOffsets/body', '1', 0_i8)
-      call self%column(steps//'/CellDataOffsets/fixed', '1', 0_i8)
-      call self%column(steps//'/CellDataOffsets/released', '1', frame*size(released))
-      call self%column(steps//'/PointDataOffsets/velocity', '1', frame*m)
+      call self%column(steps//'/PartOffsets', '1', 0.0_wp, as_wide)
+      call self%column(steps//'/NumberOfParts', '1', 1.0_wp, as_wide)
+      call self%column(steps//'/PointOffsets', '1', frame*m, as_wide)
+      call self%column(steps//'/CellOffsets', '1', none, kind=as_wide)
+      call self%column(steps//'/ConnectivityIdOffsets', '1', none, kind=as_wide)
+      call self%column(steps//'/CellDataOffsets/body', '1', 0.0_wp, as_wide)
+      call self%column(steps//'/CellDataOffsets/fixed', '1', 0.0_wp, as_wide)
+      call self%column(steps//'/CellDataOffsets/released', '1', frame*size(released), as_wide)
+      call self%column(steps//'/PointDataOffsets/velocity', '1', frame*m, as_wide)
     end associate
   end subroutine list_surfaces
 

@@ -102,7 +102,7 @@ contains
       allocate (layer(product(part)), source=0.0_wp)
       do k = 1, extent(n)
         first(n) = k
-        call file%read_block(name, first, part, layer)
+        call file%read(name, layer, first, part)
         if (file%info /= 0) exit
         if (all(ieee_is_finite(layer))) then
           if (all(layer >= least .and. layer <= most)) cycle
@@ -139,14 +139,14 @@ contains
     allocate (part(3*product(extent)), source=0.0_wp)
     associate (a => grid%lo, b => grid%hi, n => product(extent))
       if (file%has(liquid_name)) then
-        call file%read_block(liquid_name, a, extent, part(:n))
+        call file%read(liquid_name, part(:n), a, extent)
         flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) = &
           flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))*reshape(part(:n), extent)
         call fill_scalar_halo(grid, flow%liquid)
         flow%liquid_initial = liquid_volume(grid, flow%liquid)
       end if
       if (file%has(velocity_name)) then
-        call file%read_block(velocity_name, [1, a], [3, extent], part)
+        call file%read(velocity_name, part, [1, a], [3, extent])
         values = reshape(part, [3, extent])
         do d = 1, 3
           flow%u(a(1):b(1), a(2):b(2), a(3):b(3), d) = values(d, :, :, :)

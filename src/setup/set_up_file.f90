@@ -15,8 +15,9 @@ module set_up_file_m
   use rigid_body_m, only: blocks_t, drift, are_driven
   use case_blocks_m, only: blocks_init
   use clock_m, only: clock_init
-  use run_state_m, only: run_state_t
+  use state_m, only: run_state_t
   use diagnostics_m, only: step_report_t, make_row
+  use hdf5_file_m, only: as_integer
   use write_run_m, only: run_file_t, create_run_file, close_run_file
   implicit none
   private
@@ -88,7 +89,7 @@ contains
     end do
     associate (file => run%file)
       call file%group('/plan')
-      call file%store('/plan/line', '1', line)
+      call file%store('/plan/line', '1', real(line, wp), kind=as_integer)
       call file%store('/plan/place', 'm', [place], shape(place))
       call file%store('/plan/spread', 'm', [spread], shape(spread))
     end associate

@@ -112,7 +112,7 @@ contains
       real(wp) :: values(m*left%n)
 
       values = 0.0_wp
-      call file%read_block('/bodies/'//name, [1, 1, row], [m, left%n, 1], values)
+      call file%read('/bodies/'//name, values, [1, 1, row], [m, left%n, 1])
       a = reshape(values, [m, left%n])
     end subroutine read_row
   end subroutine read_left

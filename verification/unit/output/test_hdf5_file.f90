@@ -4,14 +4,35 @@ module test_hdf5_file_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use check_m, only: check, wp, sp, i8
   use parallel_m, only: is_root, nproc, my_rank, global_max
-  use hdf5_file_m, only: h5_file_t
-  use table_m, only: table_t, creating, reopening, appending
+  use hdf5_file_m, only: h5_file_t, as_integer
+  use table_m, only: result_file_t, appending
+  use state_m, only: run_state_t
   implicit none
   private
   public :: test_hdf5_file
 
   character(*), parameter :: path = 'test_hdf5_file.h5'
   integer, parameter :: layers = 12   !! of a dataset that all processes share
+
+  !> A table that has all kinds of columns.
+  type, extends(result_file_t) :: mixed_t
+  contains
+    procedure :: write_head
+    procedure :: list_columns => list_mixed
+  end type mixed_t
+
+  !> One with a field of noise and a column of much in a row.
+  type, extends(mixed_t) :: noisy_t
+  contains
+    procedure :: list_columns => list_noise
+  end type noisy_t
+
+  !> One of a field that all processes share, first with the other sign.
+  type, extends(mixed_t) :: shared_t
+    real(sp) :: sign = -1.0_sp
+  contains
+    procedure :: list_columns => list_shared
+  end type shared_t
 
 contains
 
@@ -57,46 +78,52 @@ contains
     call global_max(here)
   end subroutine meet
 
-  !> The columns of a table that has all kinds of them.
-  subroutine list_columns(step, mode, table)
-    integer, intent(in) :: step, mode
-    type(table_t), intent(inout) :: table
-    real(wp) :: place(3, 2), nobody(3, 0)
-    real(sp) :: cells(24)
+  subroutine write_head(self, state)
+    class(mixed_t), intent(inout) :: self
+    type(run_state_t), intent(in) :: state
 
-    place = step + reshape([0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], [3, 2])
-    cells = real(step, sp)
-    call table%begin(mode)
-    call table%column('/time', 's', real(step, wp))
-    call table%column('/place', 'm', place)
-    call table%column('/touched', '1', [step, -step])
-    call table%column('/nobody', 'm', nobody)
-    call table%points('/points', 'm', .true., place)
-    call table%cells('/cells', '1', [step, step + 1, step + 2])
-    call table%field('/field', 'Pa', [2, 3, 4], [1, 1, 1], [2, 3, 4], cells)
-  end subroutine list_columns
+    call self%file%attribute('/', 'step', [state%clock%step])
+  end subroutine write_head
+
+  subroutine list_mixed(self, state)
+    class(mixed_t), intent(inout) :: self
+    type(run_state_t), intent(in) :: state
+    real(wp) :: place(3, 2)
+    real(sp) :: field(24)
+
+    associate (t => state%clock%t)
+      place = t + reshape([0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], [3, 2])
+      field = real(t, sp)
+      call self%column('/time', 's', t)
+      call self%column('/place', 'm', [place], 3)
+      call self%column('/touched', '1', [t, -t], kind=as_integer)
+      call self%column('/nobody', 'm', [real(wp) ::], 3)
+      call self%points('/points', 'm', .true., place)
+      call self%cells('/cells', '1', [t, t + 1, t + 2])
+      call self%field('/field', 'Pa', [2, 3, 4], [1, 1, 1], [2, 3, 4], field)
+    end associate
+  end subroutine list_mixed
 
   subroutine test_columns()
-    type(table_t) :: table
+    type(mixed_t) :: table
+    type(run_state_t) :: state
     real(wp) :: x(6), points(3*2*11)
     integer, allocatable :: found(:)
     integer :: step, touched(22), cells(33)
 
     if (.not. is_root()) return
-    call fresh(table%file)
+    call remove(path)
     table%chunk_bytes = 64
-    call list_columns(0, creating, table)
+    call table%create(path, .false., state)
     do step = 1, 11
-      call list_columns(step, appending, table)
-      call table%file%flush()
+      state%clock%t = step
+      call table%append(step - 1, state)
     end do
     call table%file%close()
     call check_file('columns are written', table%file)
-    call table%file%open(path, .false., .true.)
-    call list_columns(0, reopening, table)
-    call table%find_rows(10, 11.0_wp)
+    call table%reopen(path, .false., 10, state)
     call check('rows are counted', table%rows == 11 .and. table%up_to_date)
-    call table%read_row('/place', 7, x)
+    call table%file%read('/place', x, [1, 1, 7], [3, 2, 1])
     call check('a row comes back', x, 7 + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp])
     call table%file%read('/touched', touched)
     call check('integers come back', all(touched(13:14) == [7, -7]))
@@ -104,16 +131,17 @@ contains
     call check('several rows at once', all(cells(19:21) == [7, 8, 9]))
     call table%file%read('/points', points)
     call check('also in single precision', points(37:39), 7 + [0.1_wp, 0.2_wp, 0.3_wp], 1.0e-6_wp)
-    call table%keep(6)
-    call list_columns(20, appending, table)
-    call table%keep(9)
-    call table%read_row('/place', 7, x)
+    state%clock%t = 20
+    call table%append(6, state)
+    call table%drop(9)
+    call table%file%read('/place', x, [1, 1, 7], [3, 2, 1])
     call check('rows are dropped and others appended', x(2), 20.2_wp)
-    call table%read_row('/place', 8, x)
+    call table%file%read('/place', x, [1, 1, 8], [3, 2, 1])
     call check('a row dropped does not come back', all(ieee_is_nan(x)))
     call table%file%shape_of('/nobody', found)
     call check('a column without elements has rows too', found(3), 9)
-    call table%find_rows(10, 1.0_wp)
+    call table%file%close()
+    call table%reopen(path, .false., 10, state)
     call check('rows that are lost are noticed', index(table%file%message, 'has lost rows') > 0)
     call table%file%close()
   end subroutine test_columns
@@ -125,67 +153,82 @@ contains
     last = (layers*(my_rank() + 1))/nproc()
   end subroutine own_layers
 
-  !> All processes together go on in a file that one process began.
-  subroutine test_go_on_together()
-    type(table_t) :: table
+  subroutine list_shared(self, state)
+    class(shared_t), intent(inout) :: self
+    type(run_state_t), intent(in) :: state
     real(sp) :: a(layers)
-    real(wp) :: x(layers)
     integer :: first, last, i
 
-    call own_layers(first, last)
-    a = [(sqrt(real(i, sp)), i=1, layers)]
+    a = self%sign*[(sqrt(real(i, sp)), i=1, layers)]
+    first = 1
+    last = layers
+    if (self%file%shared) call own_layers(first, last)
+    call self%column('/time', 's', state%clock%t)
+    call self%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
+  end subroutine list_shared
+
+  !> All processes together go on in a file that one process began.
+  subroutine test_go_on_together()
+    type(shared_t) :: table
+    type(run_state_t) :: state
+    real(wp) :: x(layers)
+    integer :: i
+
     if (is_root()) then
-      call fresh(table%file)
-      do i = 0, 3
-        call table%begin(merge(creating, appending, i == 0))
-        call table%field('/field', 'm', [layers], [1], [layers], -a)
+      call remove(path)
+      call table%create(path, .false., state)
+      do i = 0, 2
+        call table%append(i, state)
       end do
       call table%file%close()
     end if
     call meet()
-    call table%file%open(path, .true., .true.)
-    call table%begin(reopening)
-    call table%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
-    call table%keep(2)
-    call table%begin(appending)
-    call table%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
+    table%sign = 1.0_sp
+    call table%reopen(path, .true., 2, state)
+    call table%append(2, state)
     call table%file%close()
     call check_file('a file of one process goes on', table%file)
     if (.not. is_root()) return
     call table%file%open(path, .false., .false.)
-    call table%file%read_block('/field', [1, 3], [layers, 1], x)
-    call check('the new row stands in it', x, real(a, wp))
+    call table%file%read('/field', x, [1, 3], [layers, 1])
+    call check('the new row stands in it', x, real([(sqrt(real(i, sp)), i=1, layers)], wp))
     call table%file%close()
   end subroutine test_go_on_together
 
+  subroutine list_noise(self, state)
+    class(noisy_t), intent(inout) :: self
+    type(run_state_t), intent(in) :: state
+    integer, parameter :: n = 96
+    integer :: i
+
+    call self%column('/time', 's', state%clock%t)
+    call self%field('/field', 'm', [3, n/3], [1, 1], [3, n/3], [(real(mod(sin(state%clock%t*n + i) &
+      *43758.5453_wp, 1.0_wp), sp), i=1, n)])
+    call self%column('/place', 'm', spread(1.0_wp, 1, 1200), 3)
+  end subroutine list_noise
+
   !> No row takes more than it has asked for, compressed or not, however large the index grows.
   subroutine test_room()
-    type(table_t) :: table
-    integer, parameter :: rows = 2500, n = 96
+    type(noisy_t) :: table
+    type(run_state_t) :: state
+    integer, parameter :: rows = 2500
     integer(i8) :: before, after, capacity
-    real(sp) :: noise(n)
-    real(wp) :: place(3, 400)
-    integer :: i, row, too_large
+    integer :: row, too_large
     logical :: grew
 
     if (.not. is_root()) return
-    call fresh(table%file)
+    call remove(path)
+    call table%create(path, .false., state)
     too_large = 0
     grew = .false.
-    place = 1.0_wp
-    do row = 0, rows
-      noise = [(real(mod(sin(real(row*n + i, wp))*43758.5453_wp, 1.0_wp), sp), i=1, n)]
-      capacity = 0
-      if (row > 0) capacity = table%bytes_for_row()
+    do row = 1, rows
+      state%clock%t = row
+      capacity = table%bytes_for_row()
       inquire (file=path, size=before)
-      call table%begin(merge(creating, appending, row == 0))
-      call table%column('/time', 's', 1.0_wp*row)
-      call table%field('/field', 'm', [3, n/3], [1, 1], [3, n/3], noise)
-      call table%column('/place', 'm', place)
-      call table%file%flush()
+      call table%append(row - 1, state)
       inquire (file=path, size=after)
-      if (row > 0 .and. after > before + capacity) too_large = too_large + 1
-      grew = grew .or. (row > 0 .and. after > before + 50000)
+      if (after > before + capacity) too_large = too_large + 1
+      grew = grew .or. after > before + 50000
     end do
     call table%file%close()
     call check_file('many rows are written', table%file)

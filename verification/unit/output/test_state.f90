@@ -7,8 +7,7 @@ module test_state_m
   use restart_m, only: write_restart
   use file_space_m, only: bytes_for_change
   use grid_m, only: grid_t
-  use state_m, only: list_state
-  use state_list_m, only: state_list_t, checksum_of_cells
+  use state_m, only: list_state, state_list_t, checksum_of_cells
   use displacements_m, only: displacements_t
   use checksum_m, only: checksum_t
   use case_input_m, only: parameters_text
