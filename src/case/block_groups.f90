@@ -8,8 +8,7 @@ module block_groups_m
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, whole, &
     between
   use group_visitor_m, only: group_visitor_t
-  use run_groups_m, only: shortest
-  use fluid_groups_m, only: lightest
+  use run_groups_m, only: shortest, lightest
   use value_text_m, only: nearest_name, quoted_text
   implicit none
   private

@@ -16,8 +16,8 @@ module case_input_m
   use string_builder_m, only: string_builder_t
   use allowed_values_m, only: words_of
   use group_visitor_m, only: group_visitor_t
-  use run_groups_m, only: visit_run, visit_grid, visit_boundary, side_name
-  use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics
+  use run_groups_m, only: visit_run, visit_grid, visit_boundary, visit_fluid, visit_water, &
+    visit_numerics, side_name
   use block_groups_m, only: visit_contact, visit_bed, visit_start, visit_shape, visit_body, &
     visit_drop
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text, &

@@ -43,12 +43,14 @@ module namelist_text_m
     procedure :: find => group_find
   end type group_text_t
 
-  !> Where the reader stands in the text.
-  type :: cursor_t
+  !> The text, where the reader stands in it, the group that it reads, and all that is wrong so far.
+  type :: reader_t
     character(:), allocatable :: text      !! each line ends in a single line feed
     integer :: at = 1                      !! next character
     integer :: line = 1
-  end type cursor_t
+    type(group_text_t) :: group
+    type(problems_t) :: problems
+  end type reader_t
 
   character(*), parameter :: line_feed = achar(10), tab = achar(9)
   character(*), parameter :: blanks = ' '//tab//line_feed
@@ -65,230 +67,202 @@ contains
     character(*), intent(in) :: text
     type(group_text_t), allocatable, intent(out) :: groups(:)
     type(problems_t), intent(inout) :: problems
-    type(cursor_t) :: cursor
-    type(group_text_t) :: group
+    type(reader_t) :: r
     type(group_text_t), allocatable :: longer(:)
     character(:), allocatable :: ended
     integer :: n, length
     logical :: stray_reported   ! text where only a group may stand
 
-    cursor = start_of(text)
+    r%text = with_plain_blanks(text)
+    r%problems = problems
     allocate (groups(8))
     n = 0
     stray_reported = .false.
     do
-      call skip_blanks(cursor)
-      if (cursor%at > len(cursor%text)) exit
-      if (next(cursor) == '&') then
-        call read_group(cursor, group, problems)
+      call skip_blanks(r)
+      if (r%at > len(r%text)) exit
+      if (next(r) == '&') then
+        call read_group(r)
         stray_reported = .false.
-        if (len(group%name) == 0) cycle
+        if (len(r%group%name) == 0) cycle
         if (n == size(groups)) then
           allocate (longer(2*n))
           longer(:n) = groups
           call move_alloc(longer, groups)
         end if
         n = n + 1
-        groups(n) = group
+        groups(n) = r%group
         cycle
       end if
       ended = ''
       if (n > 0) ended = ' ; &'//groups(n)%name//' has ended with its ''/'''
-      length = index(cursor%text(cursor%at:), line_feed) - 1
-      if (.not. stray_reported) call problems%add_message('text outside the groups: ' &
-        //printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))//ended, cursor%line)
+      length = index(r%text(r%at:), line_feed) - 1
+      if (.not. stray_reported) call r%problems%add_message('text outside the groups: ' &
+        //printable(trim(r%text(r%at:r%at + length - 1)))//ended, r%line)
       stray_reported = .true.
-      cursor%at = cursor%at + length
+      r%at = r%at + length
     end do
     groups = groups(:n)
+    problems = r%problems
   end subroutine cut_groups
 
   !> Read one group from its '&' to its '/'.
-  subroutine read_group(cursor, group, problems)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(out) :: group
-    type(problems_t), intent(inout) :: problems
+  subroutine read_group(r)
+    type(reader_t), intent(inout) :: r
     logical :: comma    ! the last thing read is a comma
     logical :: valued   ! the last assignment has a value already
 
-    group%line = cursor%line
-    cursor%at = cursor%at + 1
-    group%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
-      name_characters) - 1)))
-    allocate (group%assignment(0))
-    if (len(group%name) == 0) then
-      call problems%add_message('''&'' without the name of a group', cursor%line)
+    r%group = group_text_t(line=r%line)
+    allocate (r%group%assignment(0))
+    r%at = r%at + 1
+    r%group%name = next_name(r)
+    if (len(r%group%name) == 0) then
+      call r%problems%add_message('''&'' without the name of a group', r%line)
       return
-    else if (group%name == 'end') then
-      call problems%add_message('&end: a group ends with ''/''', cursor%line)
-      group%name = ''
+    else if (r%group%name == 'end') then
+      call r%problems%add_message('&end: a group ends with ''/''', r%line)
+      r%group%name = ''
       return
     end if
     comma = .false.
     do
-      call skip_blanks(cursor)
-      if (group_ends(cursor, group, problems)) exit
-      if (next(cursor) == ',') then
+      call skip_blanks(r)
+      if (group_ends(r)) exit
+      if (next(r) == ',') then
         valued = .false.
-        associate (a => group%assignment)
+        associate (a => r%group%assignment)
           if (size(a) > 0) valued = size(a(size(a))%value) > 0 .or. a(size(a))%faulty
         end associate
-        if (comma .or. .not. valued) call report(cursor, group, &
-          'nothing in front of a comma; write every value', problems)
+        if (comma .or. .not. valued) call report(r, &
+          'nothing in front of a comma; write every value')
         comma = .true.
-        cursor%at = cursor%at + 1
+        r%at = r%at + 1
         cycle
       end if
       comma = .false.
-      if (starts_assignment(cursor)) then
-        call start_assignment(cursor, group, problems)
+      if (starts_assignment(r)) then
+        call start_assignment(r)
       else
-        call read_value(cursor, group, problems)
+        call read_value(r)
       end if
     end do
-    call check_last(group, problems)
+    call check_last(r)
   end subroutine read_group
 
   !> Is the group over: its '/', or the next group or the end of the text without one?
-  function group_ends(cursor, group, problems) result(yes)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(inout) :: group
-    type(problems_t), intent(inout) :: problems
+  function group_ends(r) result(yes)
+    type(reader_t), intent(inout) :: r
     logical :: yes
-    character(:), allocatable :: rest
 
     yes = .true.
-    if (cursor%at > len(cursor%text)) then
-      rest = 'the end of the text'
-    else if (next(cursor) == '/') then
-      cursor%at = cursor%at + 1
-      return
-    else if (next(cursor) == '&') then
-      rest = 'the next ''&'' on line '//to_text(cursor%line)
-      if (lower_case(cursor%text(cursor%at:min(cursor%at + 3, len(cursor%text)))) == '&end') then
-        rest = '&end'
-        cursor%at = cursor%at + 4
-      end if
-    else
+    if (r%at > len(r%text)) then
+      call spoil(r, ': no ''/'' closes the group before the end of the text', r%group%line)
+    else if (next(r) == '/') then
+      r%at = r%at + 1
+    else if (next(r) /= '&') then
       yes = .false.
-      return
+    else if (lower_case(r%text(r%at:min(r%at + 3, len(r%text)))) == '&end') then
+      r%at = r%at + 4
+      call spoil(r, ': no ''/'' closes the group before &end', r%group%line)
+    else
+      call spoil(r, ': no ''/'' closes the group before the next ''&'' on line ' &
+        //to_text(r%line), r%group%line)
     end if
-    if (.not. group%faulty) then
-      call problems%add_message('&'//group%name//': no ''/'' closes the group before '//rest, &
-                                group%line)
-    end if
-    group%faulty = .true.
   end function group_ends
 
   !> Does a name with its '=' follow? (A word alone is a value.)
-  pure function starts_assignment(cursor) result(yes)
-    type(cursor_t), intent(in) :: cursor
+  pure function starts_assignment(r) result(yes)
+    type(reader_t), intent(in) :: r
     logical :: yes
     integer :: i, closing
 
     yes = .false.
-    if (scan(next(cursor), letters//'_') == 0) return
-    associate (text => cursor%text)
-      i = past_blanks(text, cursor%at + verify(text(cursor%at:), name_characters) - 1)
-      if (text(i:i) == '(') then
-        closing = scan(text(i:), ')'//line_feed)
-        if (closing > 0) i = past_blanks(text, i + closing)
-      end if
-      yes = text(i:i) == '='
-    end associate
+    if (scan(next(r), letters//'_') == 0) return
+    i = past_blanks(r%text, r%at + verify(r%text(r%at:), name_characters) - 1)
+    if (r%text(i:i) == '(') then
+      closing = scan(r%text(i:), ')'//line_feed)
+      if (closing > 0) i = past_blanks(r%text, i + closing)
+    end if
+    yes = r%text(i:i) == '='
   end function starts_assignment
 
   !> Open the assignment whose name and '=' follow.
-  subroutine start_assignment(cursor, group, problems)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(inout) :: group
-    type(problems_t), intent(inout) :: problems
+  subroutine start_assignment(r)
+    type(reader_t), intent(inout) :: r
     type(assignment_t) :: new
     integer :: same
 
-    call check_last(group, problems)
-    new%line = cursor%line
-    new%name = printable(lower_case(taken(cursor, verify(cursor%text(cursor%at:), &
-      name_characters) - 1)))
+    call check_last(r)
+    new%line = r%line
+    new%name = next_name(r)
     allocate (new%value(0))
-    same = group%find(new%name)
-    if (size(group%assignment) < max_variables) then
-      group%assignment = [group%assignment, new]
+    same = r%group%find(new%name)
+    if (size(r%group%assignment) < max_variables) then
+      r%group%assignment = [r%group%assignment, new]
     else   ! one problem; what follows is read over
-      if (.not. group%faulty) call problems%add_message('&'//group%name//': more than ' &
-        //to_text(max_variables)//' variables in one group', new%line)
-      group%faulty = .true.
-      group%assignment(max_variables) = new
-      group%assignment(max_variables)%faulty = .true.
+      call spoil(r, ': more than '//to_text(max_variables)//' variables in one group', new%line)
+      new%faulty = .true.
+      r%group%assignment(max_variables) = new
     end if
-    call skip_blanks(cursor)
-    if (next(cursor) == '(') then
-      call report(cursor, group, 'parts of a list cannot be set; write the whole list, ' &
-                  //new%name//' = first, second, ...', problems)
+    call skip_blanks(r)
+    if (next(r) == '(') then
+      call report(r, 'parts of a list cannot be set; write the whole list, '//new%name &
+        //' = first, second, ...')
     else if (same > 0) then
-      call report(cursor, group, 'given twice in one group, first on line ' &
-                  //to_text(group%assignment(same)%line), problems)
+      call report(r, 'given twice in one group, first on line ' &
+        //to_text(r%group%assignment(same)%line))
     end if
-    do while (next(cursor) /= '=')
-      if (next(cursor) == line_feed) cursor%line = cursor%line + 1
-      cursor%at = cursor%at + 1
+    do while (next(r) /= '=')
+      if (next(r) == line_feed) r%line = r%line + 1
+      r%at = r%at + 1
     end do
-    cursor%at = cursor%at + 1
+    r%at = r%at + 1
   end subroutine start_assignment
 
   !> Read one value, repeat count included, into the last assignment of the group.
-  subroutine read_value(cursor, group, problems)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(inout) :: group
-    type(problems_t), intent(inout) :: problems
+  subroutine read_value(r)
+    type(reader_t), intent(inout) :: r
     type(value_t) :: value
     character(:), allocatable :: number
     integer :: count, digits, info, i
 
     count = 1
-    digits = verify(cursor%text(cursor%at:), '0123456789') - 1
-    if (digits > 0 .and. cursor%text(cursor%at + digits:cursor%at + digits) == '*') then
-      number = taken(cursor, digits)
-      cursor%at = cursor%at + 1
+    digits = verify(r%text(r%at:), '0123456789') - 1
+    if (digits > 0 .and. r%text(r%at + digits:r%at + digits) == '*') then
+      number = taken(r, digits)
+      r%at = r%at + 1
       count = 0
       call parse_integer(number, count, info)
       if (info /= value_ok .or. count < 1 .or. count > max_values) then
-        call report(cursor, group, 'repeat count '//printable(number)//' must be 1 to ' &
-          //to_text(max_values), problems)
+        call report(r, 'repeat count '//printable(number)//' must be 1 to '//to_text(max_values))
         count = 1
       end if
-      if (scan(next(cursor), word_ends) > 0 .and. scan(next(cursor), '"''') == 0) then
-        call report(cursor, group, 'a repeat count without its value', problems)
+      if (scan(next(r), word_ends) > 0 .and. scan(next(r), '"''') == 0) then
+        call report(r, 'a repeat count without its value')
         return
       end if
     end if
-    select case (next(cursor))
+    select case (next(r))
     case ('''', '"')
-      call take_string(cursor, group, value, problems)
+      call take_string(r, value)
     case ('=')
-      call report(cursor, group, '''='' without a name in front of it', problems)
-      cursor%at = cursor%at + 1
-      return
+      call report(r, '''='' without a name in front of it')
+      r%at = r%at + 1
     case (';')
-      call report(cursor, group, 'values are separated by commas or blanks, not by '';''', problems)
-      cursor%at = cursor%at + 1
-      return
+      call report(r, 'values are separated by commas or blanks, not by '';''')
+      r%at = r%at + 1
     case default
-      value%text = taken(cursor, scan(cursor%text(cursor%at:), word_ends) - 1)
-      call take_path(cursor, value%text)
+      value%text = taken(r, scan(r%text(r%at:), word_ends) - 1)
+      call take_path(r, value%text)
     end select
     if (.not. allocated(value%text)) return
-    if (size(group%assignment) == 0) then
-      if (.not. group%faulty) then
-        call problems%add_message('&'//group%name//' '//printable(value%text) &
-                                  //': no ''='' follows; write name = value', cursor%line)
-      end if
-      group%faulty = .true.
+    if (size(r%group%assignment) == 0) then
+      call spoil(r, ' '//printable(value%text)//': no ''='' follows; write name = value', r%line)
       return
     end if
-    associate (last => group%assignment(size(group%assignment)))
+    associate (last => r%group%assignment(size(r%group%assignment)))
       if (size(last%value) + count > max_values) then
-        call report(cursor, group, 'more than '//to_text(max_values)//' values', problems)
+        call report(r, 'more than '//to_text(max_values)//' values')
         return
       end if
       do i = 1, count
@@ -298,86 +272,88 @@ contains
   end subroutine read_value
 
   !> A quoted string; left unallocated if its line ends first.
-  subroutine take_string(cursor, group, value, problems)
-    type(cursor_t), intent(inout) :: cursor
-    type(group_text_t), intent(inout) :: group
+  subroutine take_string(r, value)
+    type(reader_t), intent(inout) :: r
     type(value_t), intent(inout) :: value
-    type(problems_t), intent(inout) :: problems
     character(1) :: quote
     integer :: i, first
 
-    quote = next(cursor)
+    quote = next(r)
     value%quoted = .true.
-    first = cursor%at
+    first = r%at
     i = first
     do
-      i = i + scan(cursor%text(i + 1:), quote//line_feed)
-      if (cursor%text(i:i) == line_feed) then
-        call report(cursor, group, 'the string '//printable(cursor%text(first:i - 1)) &
-                    //' is not closed on its line', problems)
-        group%faulty = .true.
+      i = i + scan(r%text(i + 1:), quote//line_feed)
+      if (r%text(i:i) == line_feed) then
+        call report(r, 'the string '//printable(r%text(first:i - 1))//' is not closed on its line')
+        r%group%faulty = .true.
         if (allocated(value%text)) deallocate (value%text)
-        cursor%at = i
+        r%at = i
         return
       end if
       if (.not. allocated(value%text)) value%text = ''
-      value%text = value%text//cursor%text(cursor%at + 1:i - 1)
-      cursor%at = i + 1
-      if (next(cursor) /= quote) return
+      value%text = value%text//r%text(r%at + 1:i - 1)
+      r%at = i + 1
+      if (next(r) /= quote) return
       value%text = value%text//quote   ! doubled
-      i = cursor%at
+      i = r%at
     end do
   end subroutine take_string
 
   !> An unquoted path: a '/' between characters of a word that is no number belongs to the word, so
   !! that one missing pair of quotes is one problem and does not end the group.
-  subroutine take_path(cursor, word)
-    type(cursor_t), intent(inout) :: cursor
+  subroutine take_path(r, word)
+    type(reader_t), intent(inout) :: r
     character(:), allocatable, intent(inout) :: word
     integer :: first
 
     if (scan(word, letters//'~') == 0 .or. verify(word(1:1), '0123456789+-') == 0) return
-    first = cursor%at
-    do while (next(cursor) == '/')
-      if (scan(cursor%text(cursor%at + 1:cursor%at + 1), word_ends) > 0) exit
-      cursor%at = cursor%at + scan(cursor%text(cursor%at + 1:), word_ends)
+    first = r%at
+    do while (next(r) == '/')
+      if (scan(r%text(r%at + 1:r%at + 1), word_ends) > 0) exit
+      r%at = r%at + scan(r%text(r%at + 1:), word_ends)
     end do
-    word = word//cursor%text(first:cursor%at - 1)
+    word = word//r%text(first:r%at - 1)
   end subroutine take_path
 
   !> Report the last assignment if it ended up without a value.
-  subroutine check_last(group, problems)
-    type(group_text_t), intent(inout) :: group
-    type(problems_t), intent(inout) :: problems
+  subroutine check_last(r)
+    type(reader_t), intent(inout) :: r
 
-    if (size(group%assignment) == 0) return
-    associate (last => group%assignment(size(group%assignment)))
-      if (size(last%value) > 0 .or. last%faulty .or. group%faulty) return
-      call problems%add_message('&'//group%name//' '//last%name//' = : the value is missing', &
-                                last%line)
+    if (size(r%group%assignment) == 0 .or. r%group%faulty) return
+    associate (last => r%group%assignment(size(r%group%assignment)))
+      if (size(last%value) > 0 .or. last%faulty) return
+      call r%problems%add_message('&'//r%group%name//' '//last%name &
+        //' = : the value is missing', last%line)
       last%faulty = .true.
     end associate
   end subroutine check_last
 
   !> Note a fault of form of the last assignment, once for each assignment.
-  subroutine report(cursor, group, what, problems)
-    type(cursor_t), intent(in) :: cursor
-    type(group_text_t), intent(inout) :: group
+  subroutine report(r, what)
+    type(reader_t), intent(inout) :: r
     character(*), intent(in) :: what
-    type(problems_t), intent(inout) :: problems
 
-    if (size(group%assignment) == 0) then
-      if (.not. group%faulty) call problems%add_message('&'//group%name//': '//what, cursor%line)
-      group%faulty = .true.
+    if (size(r%group%assignment) == 0) then
+      call spoil(r, ': '//what, r%line)
       return
     end if
-    associate (last => group%assignment(size(group%assignment)))
-      if (.not. last%faulty) then
-        call problems%add_message('&'//group%name//' '//last%name//': '//what, cursor%line)
-      end if
+    associate (last => r%group%assignment(size(r%group%assignment)))
+      if (.not. last%faulty) call r%problems%add_message('&'//r%group%name//' '//last%name//': ' &
+        //what, r%line)
       last%faulty = .true.
     end associate
   end subroutine report
+
+  !> Note a fault of form of the group, the first one alone; `what` goes on right after its name.
+  subroutine spoil(r, what, line)
+    type(reader_t), intent(inout) :: r
+    character(*), intent(in) :: what
+    integer, intent(in) :: line
+
+    if (.not. r%group%faulty) call r%problems%add_message('&'//r%group%name//what, line)
+    r%group%faulty = .true.
+  end subroutine spoil
 
   !> Number of the first assignment to `name`; 0 if there is none.
   pure function group_find(self, name) result(i)
@@ -409,58 +385,66 @@ contains
     text = printable(text)
   end function assignment_shown
 
-  !> The start of a text, with blanks that do not break as blanks, but in strings.
-  pure function start_of(text) result(cursor)
-    character(*), intent(in) :: text
-    type(cursor_t) :: cursor
+  !> The lines of a text, with blanks that do not break as blanks, but in strings.
+  pure function with_plain_blanks(raw) result(text)
+    character(*), intent(in) :: raw
+    character(:), allocatable :: text
     character(*), parameter :: no_break_space = char(194)//char(160)
     character(1) :: quote   ! that has begun a string on this line, or blank
     integer :: i
 
-    cursor%text = plain_lines(text)
+    text = plain_lines(raw)
     quote = ' '
-    do i = 1, len(cursor%text) - 1
-      associate (c => cursor%text(i:i))
+    do i = 1, len(text) - 1
+      associate (c => text(i:i))
         if (c == line_feed .or. c == quote) then
           quote = ' '
         else if (quote == ' ' .and. scan(c, '"''') == 1) then
           quote = c
         end if
       end associate
-      if (quote == ' ' .and. cursor%text(i:i + 1) == no_break_space) cursor%text(i:i + 1) = '  '
+      if (quote == ' ' .and. text(i:i + 1) == no_break_space) text(i:i + 1) = '  '
     end do
-  end function start_of
+  end function with_plain_blanks
 
   !> The next character; only to be asked before the end.
-  pure function next(cursor) result(c)
-    type(cursor_t), intent(in) :: cursor
+  pure function next(r) result(c)
+    type(reader_t), intent(in) :: r
     character(1) :: c
 
-    c = cursor%text(cursor%at:cursor%at)
+    c = r%text(r%at:r%at)
   end function next
 
   !> Take so many characters.
-  function taken(cursor, length) result(word)
-    type(cursor_t), intent(inout) :: cursor
+  function taken(r, length) result(word)
+    type(reader_t), intent(inout) :: r
     integer, intent(in) :: length
     character(:), allocatable :: word
 
-    word = cursor%text(cursor%at:cursor%at + length - 1)
-    cursor%at = cursor%at + length
+    word = r%text(r%at:r%at + length - 1)
+    r%at = r%at + length
   end function taken
 
-  !> Go on past blanks, line ends and comments.
-  pure subroutine skip_blanks(cursor)
-    type(cursor_t), intent(inout) :: cursor
+  !> Take a name, in small letters; empty if none follows.
+  function next_name(r) result(name)
+    type(reader_t), intent(inout) :: r
+    character(:), allocatable :: name
 
-    do while (cursor%at <= len(cursor%text))
-      if (next(cursor) == '!') then
-        cursor%at = cursor%at + index(cursor%text(cursor%at:), line_feed) - 1
-      else if (scan(next(cursor), blanks) == 0) then
+    name = printable(lower_case(taken(r, verify(r%text(r%at:), name_characters) - 1)))
+  end function next_name
+
+  !> Go on past blanks, line ends and comments.
+  pure subroutine skip_blanks(r)
+    type(reader_t), intent(inout) :: r
+
+    do while (r%at <= len(r%text))
+      if (next(r) == '!') then
+        r%at = r%at + index(r%text(r%at:), line_feed) - 1
+      else if (scan(next(r), blanks) == 0) then
         exit
       end if
-      if (next(cursor) == line_feed) cursor%line = cursor%line + 1
-      cursor%at = cursor%at + 1
+      if (next(r) == line_feed) r%line = r%line + 1
+      r%at = r%at + 1
     end do
   end subroutine skip_blanks
 

@@ -147,7 +147,7 @@ contains
       //'"title": "Case file of mics",'//line_end &
       //'"description": "Written by make reference; do not edit.",'//line_end &
       //'"type": "object", "additionalProperties": false, "required": ' &
-      //strings(needed(2:), ' ')//','//line_end//'"properties": {'//places(2:)//'},'//line_end &
+      //strings(needed(2:))//','//line_end//'"properties": {'//places(2:)//'},'//line_end &
       //'"$defs": {'//groups(2:)//'}}'//line_end
   end function schema_text
 
@@ -180,12 +180,12 @@ contains
       needed = ''
       do while (rest /= '')
         bar = index(rest, '|')
-        needed = needed//', {"required": '//strings(rest(:bar - 1), ' ')//'}'
+        needed = needed//', {"required": '//strings(rest(:bar - 1))//'}'
         rest = rest(bar + 1:)
       end do
       text = text//', "anyOf": ['//needed(3:)//']'
     else if (needed /= '') then
-      text = text//', "required": '//strings(needed(2:), ' ')
+      text = text//', "required": '//strings(needed(2:))
     end if
     text = text//', "properties": {'//rules(2:)//'}}'
   end function group_schema
@@ -199,7 +199,7 @@ contains
     select case (entry%kind)
     case ('logical'); text = '"type": "boolean"'
     case ('name'); text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
-    case ('choice'); text = '"enum": '//strings(entry%choices, ' ')
+    case ('choice'); text = '"enum": '//strings(entry%choices)
     case ('number')
       associate (allowed => entry%allowed)
         text = '"type": "number"'
@@ -225,33 +225,17 @@ contains
     logical, intent(in) :: list
     character(:), allocatable :: text
 
-    select case (value(1:1))
-    case ('''')
-      text = quoted(value(2:len(value) - 1))
-      if (list .and. index(value, ''', ''') > 0) text = strings(value(2:len(value) - 1), ''', ''')
-    case ('.')
-      text = value(2:len(value) - 1)
-    case default
-      text = value
-      if (list .and. index(value, ',') > 0) text = '['//value//']'
-    end select
+    text = replaced(value, "'", '"')
+    if (value(1:1) == '.') text = value(2:len(value) - 1)
+    if (list .and. index(value, ',') > 0) text = '['//text//']'
   end function json
 
-  !> A list of words in JSON.
-  pure function strings(words, separator) result(text)
-    character(*), intent(in) :: words, separator
+  !> A list of words, one blank between them, in JSON.
+  pure function strings(words) result(text)
+    character(*), intent(in) :: words
     character(:), allocatable :: text
-    integer :: first, length
 
-    text = '['
-    first = 1
-    do
-      length = index(words(first:), separator) - 1
-      if (length < 0) exit
-      text = text//'"'//words(first:first + length - 1)//'", '
-      first = first + length + len(separator)
-    end do
-    text = text//'"'//words(first:)//'"]'
+    text = '["'//replaced(words, ' ', '", "')//'"]'
   end function strings
 
   !> A string between double quotes. The texts of the groups hold nothing that must be escaped
@@ -259,14 +243,25 @@ contains
   pure function quoted(raw) result(text)
     character(*), intent(in) :: raw
     character(:), allocatable :: text
+
+    text = '"'//replaced(replaced(raw, '\', '\\'), '"', '\"')//'"'
+  end function quoted
+
+  !> A text with another one for each letter of a kind.
+  pure function replaced(raw, letter, by) result(text)
+    character(*), intent(in) :: raw, by
+    character(1), intent(in) :: letter
+    character(:), allocatable :: text
     integer :: i
 
-    text = '"'
+    text = ''
     do i = 1, len(raw)
-      if (scan(raw(i:i), '"\') == 1) text = text//'\'
-      text = text//raw(i:i)
+      if (raw(i:i) == letter) then
+        text = text//by
+      else
+        text = text//raw(i:i)
+      end if
     end do
-    text = text//'"'
-  end function quoted
+  end function replaced
 
 end module reference_m
