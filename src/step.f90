@@ -36,8 +36,8 @@ module step_m
   use stage_m, only: stage_t
   use solid_fraction_m, only: update_solid
   use liquid_fill_m, only: raise_surface
-  use fluid_transport_m, only: begin_carrying, fit_fluxes, carry_fluid, finish_carrying, &
-                               fluxes_of_step, time_step_t
+  use fluid_transport_m, only: begin_carrying, carry_fluid, finish_carrying
+  use liquid_transport_m, only: begin_transport
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
   use rigid_body_m, only: follow_motions, look_ahead
@@ -68,7 +68,6 @@ contains
   subroutine take_step(sim, report)
     type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(out) :: report
-    type(time_step_t) :: time_step
     type(stage_t) :: stage
     real(wp) :: dt_before   ! of the last step [s]
     real(wp) :: depth       ! [m]
@@ -79,7 +78,8 @@ contains
     ! 2 time step
     call choose_step(sim, report)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
-               coupling => sim%coupling, dt => sim%clock%dt, scratch => sim%scratch)
+               coupling => sim%coupling, dt => sim%clock%dt, scratch => sim%scratch, &
+               liquid => sim%transport%liquid)
       ! 3 half kick
       if (sim%wet) call begin(sim, dt_before, report%inertia_clips)
       ! 4 bodies
@@ -95,13 +95,12 @@ contains
         call toc(sim%timer_solid)
         ! 6 fluxes
         call tic(sim%timer_transport)
-        time_step = time_step_t(dt, report%cfl_carried, sim%clock%step)
-        call begin_carrying(time_step, scratch, sim%transport)
-        call fit_fluxes(grid, sim%before, sim%solid, time_step, flow, &
-                        coupling%pressure%system%solver, sim%transport)
+        call begin_carrying(report%cfl_carried, scratch, sim%transport)
+        call begin_transport(grid, sim%before, sim%solid, dt, coupling%pressure%system%solver, &
+                             liquid, flow)
         ! 7 advection
-        call carry_fluid(case%fluid, grid, sim%before, time_step, flow, sim%transport)
-        if (coupling%implicit_momentum) call fluxes_of_step(grid, sim%transport, coupling%c_ismac%q)
+        call carry_fluid(case%fluid, grid, sim%before, sim%clock%step, flow, sim%transport)
+        if (coupling%implicit_momentum) coupling%c_ismac%q = liquid%subcycles*liquid%volumes%q
         call finish_carrying(grid, sim%solid, flow, scratch, sim%transport)
         ! 8 mixture
         call mix_fluid(case%fluid, flow)

@@ -6,7 +6,7 @@ module added_mass_m
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use buoyancy_m, only: displaced_t, displaced_fluid
+  use buoyancy_m, only: displaced_fluid
   use rigid_body_m, only: blocks_t
   implicit none
   private
@@ -31,7 +31,7 @@ contains
     real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
-    type(displaced_t) :: displaced(bodies%n)
+    real(wp) :: displaced(4, bodies%n)
     logical :: moved(bodies%n), rests
     real(wp) :: push
     integer :: b
@@ -46,8 +46,8 @@ contains
     displaced = displaced_fluid(grid, fluid, solid, bodies, c, moved)
     n_clipped = 0
     do b = 1, blocks%n
-      blocks%added_mass(b) = min(coefficient*displaced(b)%mass, largest*blocks%mass(b))
-      if (coefficient*displaced(b)%mass > largest*blocks%mass(b)) n_clipped = n_clipped + 1
+      blocks%added_mass(b) = min(coefficient*displaced(1, b), largest*blocks%mass(b))
+      if (coefficient*displaced(1, b) > largest*blocks%mass(b)) n_clipped = n_clipped + 1
     end do
   end subroutine update_added_mass
 

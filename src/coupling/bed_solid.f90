@@ -62,7 +62,15 @@ contains
       call add_walls(p(:, :n), low, high, parts)
       call add_prism(p(:, :n), low(3), min_tet*grid%volume, parts)
     end do
-    call make_shape_of(parts, centre, solid)
+    n = parts%n_corner
+    allocate (solid%point(3, n + parts%n_tet_corner))
+    if (n > 0) solid%point(:, :n) = parts%corner(:, :n)
+    if (parts%n_tet_corner > 0) solid%point(:, n + 1:) = parts%tet_corner(:, :parts%n_tet_corner)
+    solid%point = solid%point - spread(centre, 2, size(solid%point, 2))
+    allocate (solid%facet(parts%n_facet + 1), source=n + 1)
+    if (n > 0) solid%facet(:parts%n_facet) = parts%first(:parts%n_facet)
+    solid%facet_point = [(f, f=1, n)]
+    solid%flow_tet = reshape([(n + f, f=1, parts%n_tet_corner)], [4, parts%n_tet_corner/4])
   end subroutine make_bed_solid
 
   !> Append a polygon of the surface.
@@ -128,23 +136,5 @@ contains
       parts%n_tet_corner = parts%n_tet_corner + 4
     end subroutine add_tet
   end subroutine add_prism
-
-  !> One shape of all parts.
-  subroutine make_shape_of(parts, centre, solid)
-    type(parts_t), intent(in) :: parts
-    real(wp), intent(in) :: centre(3)   !! [m]
-    type(shape_t), intent(inout) :: solid
-    integer :: i, n
-
-    n = parts%n_corner
-    allocate (solid%point(3, n + parts%n_tet_corner))
-    if (n > 0) solid%point(:, :n) = parts%corner(:, :n)
-    if (parts%n_tet_corner > 0) solid%point(:, n + 1:) = parts%tet_corner(:, :parts%n_tet_corner)
-    solid%point = solid%point - spread(centre, 2, size(solid%point, 2))
-    allocate (solid%facet(parts%n_facet + 1), source=n + 1)
-    if (n > 0) solid%facet(:parts%n_facet) = parts%first(:parts%n_facet)
-    solid%facet_point = [(i, i=1, n)]
-    solid%flow_tet = reshape([(n + i, i=1, parts%n_tet_corner)], [4, parts%n_tet_corner/4])
-  end subroutine make_shape_of
 
 end module bed_solid_m

@@ -29,13 +29,7 @@ module buoyancy_m
     terms_at_once
   implicit none
   private
-  public :: displaced_t, displaced_force, displaced_fluid, mass_defect, held_mass
-
-  !> Fluid in the true place of a body.
-  type :: displaced_t
-    real(wp) :: mass = 0.0_wp        !! [kg]
-    real(wp) :: moment(3) = 0.0_wp   !! first moment about the centre of mass of the body [kg m]
-  end type displaced_t
+  public :: displaced_force, displaced_fluid, mass_defect, held_mass
 
 contains
 
@@ -48,13 +42,13 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
     real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
-    type(displaced_t) :: displaced(bodies%n)
+    real(wp) :: displaced(4, bodies%n)
     integer :: b
 
     displaced = displaced_fluid(grid, fluid, solid, bodies, c, bodies%present)
     do b = 1, bodies%n
-      force(1:3, b) = -displaced(b)%mass*fluid%gravity
-      force(4:6, b) = -cross(displaced(b)%moment, fluid%gravity)
+      force(1:3, b) = -displaced(1, b)*fluid%gravity
+      force(4:6, b) = -cross(displaced(2:4, b), fluid%gravity)
     end do
   end subroutine displaced_force
 
@@ -70,7 +64,7 @@ contains
     type(rigid_flux_t), intent(in) :: flux
     type(flow_t), intent(in) :: flow
     real(wp) :: defect(6, 3, bodies%n)   !! [kg, kg m]
-    type(displaced_t) :: displaced(bodies%n)
+    real(wp) :: displaced(4, bodies%n)
     real(wp) :: counted(4, 3, bodies%n)
     integer :: b, d
 
@@ -80,8 +74,8 @@ contains
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
       do d = 1, 3
-        defect(1:3, d, b) = (displaced(b)%mass - counted(1, d, b))*unit_step(:, d)
-        defect(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) &
+        defect(1:3, d, b) = (displaced(1, b) - counted(1, d, b))*unit_step(:, d)
+        defect(4:6, d, b) = cross(displaced(2:4, b), real(unit_step(:, d), wp)) &
                             - counted(2:4, d, b)
       end do
     end do
@@ -106,7 +100,8 @@ contains
     end do
   end function held_mass
 
-  !> Fluid in the true place of each body asked for.
+  !> Mass and first moment, about the centre of mass of the body, of the fluid in the true place of
+  !! each body asked for.
   function displaced_fluid(grid, fluid, solid, bodies, c, wanted) result(displaced)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
@@ -115,7 +110,7 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
     logical, intent(in) :: wanted(:)   !! (bodies)
-    type(displaced_t) :: displaced(bodies%n)
+    real(wp) :: displaced(4, bodies%n)   !! [kg, kg m]
     integer(i8) :: accumulator(accumulator_size, 4*bodies%n)
     real(wp) :: term(terms_at_once, 4), total(4*bodies%n)
     integer :: b, m, n, from, i(3)
@@ -139,9 +134,7 @@ contains
     end do
     !$omp end parallel
     call exact_totals(accumulator, total)
-    do b = 1, bodies%n
-      displaced(b) = displaced_t(total(4*b - 3), total(4*b - 2:4*b))
-    end do
+    displaced = reshape(total, shape(displaced))
   end function displaced_fluid
 
   !> Mass and first moment about x of the fluid in entry m of the cells by body.

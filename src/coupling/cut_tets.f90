@@ -22,64 +22,43 @@ module cut_tets_m
 
 contains
 
-  !> Tetrahedra of the cut cells among the cells listed.
+  !> Tetrahedra of the cut cells among the cells listed: all but those with the cell wholly outside
+  !! one face.
   subroutine list_cut_tets(work, self)
     type(cut_tets_t), intent(inout) :: work
     type(body_shares_t), intent(inout) :: self
+    integer :: t, i, j, k, m, n_pair, low(3), high(3), first, last, c(3)
+    real(wp) :: n(3, 4), d(4)
 
-    call ensure_grid(self, work)
-    call mark_cut_cells(self, work)
-    call pair_tets(self, work)
-  end subroutine list_cut_tets
-
-  !> Make the arrays long enough for the body; they only grow.
-  subroutine ensure_grid(self, work)
-    type(body_shares_t), intent(in) :: self
-    type(cut_tets_t), intent(inout) :: work
-    integer :: m(3)
-
-    m = max(abs(self%low), abs(self%high)) + 1
-    if (allocated(work%number)) then
-      if (all(ubound(work%number) >= m)) return
-      m = max(m, ubound(work%number))
-      deallocate (work%number, work%run)
+    c = max(abs(self%low), abs(self%high)) + 1
+    if (allocated(work%number)) then   ! arrays long enough for the body; they only grow
+      if (any(ubound(work%number) < c)) then
+        c = max(c, ubound(work%number))
+        deallocate (work%number, work%run)
+      end if
     end if
-    allocate (work%number(-m(1):m(1), -m(2):m(2), -m(3):m(3)), source=0)
-    allocate (work%run(4, -m(2):m(2), -m(3):m(3)))
-    call ensure_capacity(1, work%pair, rows=2)
-  end subroutine ensure_grid
-
-  !> Number the cut cells on the grid; in each row, ends of their first run, and of all that follow.
-  pure subroutine mark_cut_cells(self, work)
-    type(body_shares_t), intent(in) :: self
-    type(cut_tets_t), intent(inout) :: work
-    integer :: m, i(3)
-
+    if (.not. allocated(work%number)) then
+      allocate (work%number(-c(1):c(1), -c(2):c(2), -c(3):c(3)), source=0)
+      allocate (work%run(4, -c(2):c(2), -c(3):c(3)))
+      call ensure_capacity(1, work%pair, rows=2)
+    end if
+    ! Number the cut cells on the grid; in each row, ends of their first run, of all that follow.
     work%run(1, self%low(2):self%high(2), self%low(3):self%high(3)) = 0
     work%run(2, self%low(2):self%high(2), self%low(3):self%high(3)) = -1   ! no cut cells
     do m = 1, self%n_cell
       if (self%alpha(m) >= 1.0_wp) cycle
-      i = self%cell(:, m)
-      work%number(i(1), i(2), i(3)) = m
-      associate (run => work%run(:, i(2), i(3)))
+      c = self%cell(:, m)
+      work%number(c(1), c(2), c(3)) = m
+      associate (run => work%run(:, c(2), c(3)))
         if (run(1) > run(2)) then
-          run = i(1)
+          run = c(1)
         else
-          if (i(1) /= run(4) + 1 .and. run(3) <= run(2)) run(3) = i(1)
-          if (i(1) == run(2) + 1) run(2) = i(1)
-          run(4) = i(1)
+          if (c(1) /= run(4) + 1 .and. run(3) <= run(2)) run(3) = c(1)
+          if (c(1) == run(2) + 1) run(2) = c(1)
+          run(4) = c(1)
         end if
       end associate
     end do
-  end subroutine mark_cut_cells
-
-  !> Tetrahedra that may touch each cut cell: all but those with the cell wholly outside one face.
-  subroutine pair_tets(self, work)
-    type(body_shares_t), intent(inout) :: self
-    type(cut_tets_t), intent(inout) :: work
-    integer :: t, i, j, k, n_pair, low(3), high(3), first, last
-    real(wp) :: n(3, 4), d(4)
-
     n_pair = 0
     do t = 1, size(self%corner, 3)
       low = floor(minval(self%corner(:, :, t), 2)) + 1
@@ -107,7 +86,7 @@ contains
     do t = 1, self%n_cell
       work%number(self%cell(1, t), self%cell(2, t), self%cell(3, t)) = 0
     end do
-  end subroutine pair_tets
+  end subroutine list_cut_tets
 
   !> Outward normals and plane constants of a tetrahedron: n.x <= d inside. One of negative volume,
   !! a part to be taken away again (see `bed_solid_m`), is turned inside out.

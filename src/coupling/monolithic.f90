@@ -25,7 +25,7 @@ module monolithic_m
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use old_time_correction_m, only: store_correction
   use advected_pressure_m, only: advect_pressure
-  use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole, &
+  use half_kick_m, only: find_liquid, find_first_half, add_first_half, change_where, &
                          force_of_half_kick
   use buoyancy_m, only: displaced_force, mass_defect, held_mass
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
@@ -208,7 +208,7 @@ contains
       if (self%implicit_momentum) then
         call accelerate_cells(s, self)
       else
-        call add_second_half(grid, s%dt, a, flow%u)
+        call change_where(grid, a%kicked, .true., flow%u, 0.5_wp*s%dt, a%cell)   ! the second half
         force(:, :, by_half_kick) = force_of_half_kick(grid, self%fluid, self%merged_before, &
           self%merged, bodies, s%dt, flow, a, self%kick)
       end if
@@ -293,7 +293,7 @@ contains
       if (self%implicit_momentum) then
         call renew_acceleration(s, self)
       else
-        call add_whole(grid, dt, a, flow%u)
+        call change_where(grid, a%kicked, .false., flow%u, dt, a%cell)   ! the whole
       end if
     end associate
   end subroutine predict_faces

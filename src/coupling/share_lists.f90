@@ -39,9 +39,15 @@ contains
   subroutine start_lists(self)
     type(body_shares_t), intent(inout) :: self
 
-    call ensure_cell(1, self)
-    call ensure_face(1, self)
-    call ensure_hit(1, self)
+    call ensure_capacity(1, self%cell)
+    call ensure_capacity(1, self%inside)
+    call ensure_capacity(1, self%alpha)
+    call ensure_capacity(1, self%centroid)
+    call ensure_capacity(1, self%face, rows=4)
+    call ensure_capacity(1, self%beta)
+    call ensure_capacity(1, self%face_centroid)
+    call ensure_capacity(1, self%hit, rows=4)
+    call ensure_capacity(1, self%at)
   end subroutine start_lists
 
   !> Append a cell.
@@ -54,7 +60,10 @@ contains
 
     n = self%n_cell + 1
     self%n_cell = n
-    call ensure_cell(n, self)
+    call ensure_capacity(n, self%cell)
+    call ensure_capacity(n, self%inside)
+    call ensure_capacity(n, self%alpha)
+    call ensure_capacity(n, self%centroid)
     self%cell(:, n) = cell
     self%inside(n) = inside
     if (moment(1) > 1.0_wp - full_cell) then
@@ -66,17 +75,6 @@ contains
     end if
   end subroutine add_cell
 
-  !> Make room for n cells.
-  pure subroutine ensure_cell(n, self)
-    integer, intent(in) :: n
-    type(body_shares_t), intent(inout) :: self
-
-    call ensure_capacity(n, self%cell)
-    call ensure_capacity(n, self%inside)
-    call ensure_capacity(n, self%alpha)
-    call ensure_capacity(n, self%centroid)
-  end subroutine ensure_cell
-
   !> Append a face.
   subroutine add_face(face, moment, self)
     integer, intent(in) :: face(4)
@@ -86,7 +84,9 @@ contains
 
     n = self%n_face + 1
     self%n_face = n
-    call ensure_face(n, self)
+    call ensure_capacity(n, self%face, rows=4)
+    call ensure_capacity(n, self%beta)
+    call ensure_capacity(n, self%face_centroid)
     self%face(:, n) = face
     d = face(4)
     self%face_centroid(d, n) = 0.0_wp
@@ -99,16 +99,6 @@ contains
     end if
   end subroutine add_face
 
-  !> Make room for n faces.
-  pure subroutine ensure_face(n, self)
-    integer, intent(in) :: n
-    type(body_shares_t), intent(inout) :: self
-
-    call ensure_capacity(n, self%face, rows=4)
-    call ensure_capacity(n, self%beta)
-    call ensure_capacity(n, self%face_centroid)
-  end subroutine ensure_face
-
   !> Append a hit.
   subroutine add_hit(link, at, self)
     integer, intent(in) :: link(4)
@@ -118,18 +108,10 @@ contains
 
     n = self%n_hit + 1
     self%n_hit = n
-    call ensure_hit(n, self)
+    call ensure_capacity(n, self%hit, rows=4)
+    call ensure_capacity(n, self%at)
     self%hit(:, n) = link
     self%at(n) = at
   end subroutine add_hit
-
-  !> Make room for n hits.
-  pure subroutine ensure_hit(n, self)
-    integer, intent(in) :: n
-    type(body_shares_t), intent(inout) :: self
-
-    call ensure_capacity(n, self%hit, rows=4)
-    call ensure_capacity(n, self%at)
-  end subroutine ensure_hit
 
 end module share_lists_m

@@ -5,10 +5,10 @@
 !! direction (`liquid_sweep_m`): 0 <= W <= Vt holds without clipping and nothing is redistributed.
 !! Small cells receive in the sweeps and give afterwards (`small_cells_m`).
 !!
-!! Momentum rides on the same volumes: after `sweep`, `q(:,:,:,d)` and `g(:,:,:,d)` of `volumes`
-!! hold what has just moved; after `small_cells` the faces behind small donors do. Source and trial
-!! of the scheme: docs/theory.md. Departure from the paper: it moves the mixture and knows no open
-!! volume.
+!! Momentum rides on the same volumes: after `sweep_volumes`, `q(:,:,:,d)` and `g(:,:,:,d)` of
+!! `volumes` hold what has just moved; after `small_cells` the faces behind small donors do. Source
+!! and trial of the scheme: docs/theory.md. Departure from the paper: it moves the mixture and knows
+!! no open volume.
 module liquid_transport_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
@@ -19,7 +19,7 @@ module liquid_transport_m
   use elliptic_solver_m, only: elliptic_solver_t
   use narrow_band_m, only: narrow_band_init
   use open_flux_m, only: open_flux_t, flux_of_velocity, fit_to_bodies
-  use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
+  use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
                            renew_shares
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
@@ -27,7 +27,7 @@ module liquid_transport_m
   implicit none
   private
   public :: liquid_transport_t, liquid_transport_init
-  public :: begin_transport, begin_subcycle, sweep, small_cells, finish_transport
+  public :: begin_transport, begin_subcycle, small_cells, finish_transport
 
   !> The six orders of the directions.
   integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 1, 3, 2, &
@@ -65,12 +65,13 @@ contains
     allocate (self%side(2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))), source=0.0_wp)
   end subroutine liquid_transport_init
 
-  !> Volumes through the faces in a subcycle, running values.
+  !> Stage 6: the volumes through the faces in a subcycle, made to fit the moving bodies; running
+  !! values.
   subroutine begin_transport(grid, old, new, dt, solver, self, flow)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old, new
-    real(wp), intent(in) :: dt
-    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances
+    type(solid_geometry_t), intent(in) :: old, new   !! at the start and the end of the step
+    real(wp), intent(in) :: dt   !! [s]
+    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(in) :: flow   !! liquid, fluid volume, c (halo filled) and uf of the begin
     integer :: k
@@ -106,16 +107,6 @@ contains
     if (subcycle > 1) call renew_shares(grid, old, self%small, self%volumes)
     call find_small_cells(grid, old, self%volumes, self%small)
   end subroutine begin_subcycle
-
-  !> Move liquid and open volume in direction d.
-  subroutine sweep(grid, old, d, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old   !! bodies at the begin of the step
-    integer, intent(in) :: d
-    type(liquid_transport_t), intent(inout) :: self
-
-    call sweep_volumes(grid, old, d, self%volumes, self%sweeps)
-  end subroutine sweep
 
   !> The small cells give: the volumes are final for this subcycle.
   subroutine small_cells(grid, self)

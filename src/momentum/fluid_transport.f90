@@ -6,15 +6,14 @@ module fluid_transport_m
   use scratch_m, only: scratch_t, take, give
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-                                begin_subcycle, sweep, small_cells, finish_transport
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_subcycle, &
+                                small_cells, finish_transport
+  use liquid_sweep_m, only: sweep_volumes
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_implicit
-  use elliptic_solver_m, only: elliptic_solver_t
   implicit none
   private
-  public :: fluid_transport_t, fluid_transport_init, time_step_t, begin_carrying, fit_fluxes, &
-            carry_fluid, finish_carrying, fluxes_of_step
+  public :: fluid_transport_t, fluid_transport_init, begin_carrying, carry_fluid, finish_carrying
 
   real(wp), parameter :: subcycle_courant = 0.9_wp
     !! of one subcycle at most: a cell gives less than it has
@@ -25,13 +24,6 @@ module fluid_transport_m
     type(momentum_t) :: momentum
     logical :: carries_momentum = .true.   !! with the liquid; C-ISMAC does it in its predictor
   end type fluid_transport_t
-
-  !> The step at hand.
-  type :: time_step_t
-    real(wp) :: dt = 0.0_wp        !! [s]
-    real(wp) :: courant = 0.0_wp   !! largest share of itself that a cell gives [-]
-    integer :: number = 0          !! of the step, which decides the order of the sweeps
-  end type time_step_t
 
 contains
 
@@ -53,15 +45,15 @@ contains
   end subroutine fluid_transport_init
 
   !> The subcycles of a step and its work arrays.
-  subroutine begin_carrying(time_step, scratch, self)
-    type(time_step_t), intent(in) :: time_step
+  subroutine begin_carrying(courant, scratch, self)
+    real(wp), intent(in) :: courant   !! largest share of itself that a cell gives in the step [-]
     type(scratch_t), intent(inout) :: scratch
     type(fluid_transport_t), intent(inout) :: self
     real(wp), parameter :: round_off = 1.0e-9_wp
 
     ! Number of equal subcycles in which the volumes of a step move, so that none passes the Courant
     ! number that the sweeps can follow.
-    self%liquid%subcycles = ceiling(min(time_step%courant/subcycle_courant - round_off, &
+    self%liquid%subcycles = ceiling(min(courant/subcycle_courant - round_off, &
                                         real(max_subcycles, wp)))
     self%liquid%subcycles = max(self%liquid%subcycles, 1)
     associate (volumes => self%liquid%volumes)   ! nobody needs them after the transport
@@ -76,32 +68,20 @@ contains
     if (self%carries_momentum) call take(scratch, self%momentum%momentum)
   end subroutine begin_carrying
 
-  !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
-  subroutine fit_fluxes(grid, before, after, time_step, flow, solver, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
-    type(time_step_t), intent(in) :: time_step
-    type(flow_t), intent(in) :: flow   !! halos filled
-    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
-    type(fluid_transport_t), intent(inout) :: self
-
-    call begin_transport(grid, before, after, time_step%dt, solver, self%liquid, flow)
-  end subroutine fit_fluxes
-
   !> Stage 7: liquid and momentum pass the faces, direction by direction, small cells last. With
   !! C-ISMAC momentum waits for the predictor, which uses the volumes of the same subcycles.
-  subroutine carry_fluid(fluid, grid, before, time_step, flow, self)
+  subroutine carry_fluid(fluid, grid, before, step, flow, self)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before   !! bodies at the start of the step
-    type(time_step_t), intent(in) :: time_step
+    integer, intent(in) :: step   !! its number, which decides the order of the sweeps
     type(flow_t), intent(inout) :: flow            !! its velocity
     type(fluid_transport_t), intent(inout) :: self
     integer :: n, subcycle
 
     associate (liquid => self%liquid, volumes => self%liquid%volumes, momentum => self%momentum)
       do subcycle = 1, liquid%subcycles
-        call begin_subcycle(grid, before, subcycle, time_step%number, liquid)
+        call begin_subcycle(grid, before, subcycle, step, liquid)
         if (self%carries_momentum) then
           call momentum_begin(grid, fluid, volumes%w, volumes%v, volumes%c, flow%u, momentum)
           do n = 1, 3
@@ -110,23 +90,13 @@ contains
           call momentum_implicit(grid, fluid, liquid, flow%u, momentum)
         else
           do n = 1, 3
-            call sweep(grid, before, liquid%order(n), liquid)
+            call sweep_volumes(grid, before, liquid%order(n), volumes, liquid%sweeps)
           end do
           call small_cells(grid, liquid)
         end if
       end do
     end associate
   end subroutine carry_fluid
-
-  !> Volumes that passed the lower faces in the whole step.
-  subroutine fluxes_of_step(grid, self, q)
-    type(grid_t), intent(in) :: grid
-    type(fluid_transport_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m3]
-
-    q = self%liquid%subcycles*self%liquid%volumes%q
-  end subroutine fluxes_of_step
 
   !> The liquid in the cells and its share C, at the end of the step; the work arrays go back.
   subroutine finish_carrying(grid, after, flow, scratch, self)

@@ -12,7 +12,7 @@
 !! Only liquid away from the free surface takes part. At the surface and in gas the density changes
 !! from step to step, and the old pressure of a cell that was liquid would act on gas, 830 times as
 !! strongly: there it is only a guess. Neither transport nor viscosity sees it, the faces take it as
-!! a whole, and the cells get it after them (`add_whole`): velocity depends on the sum of old and
+!! a whole, and the cells get it after them: velocity depends on the sum of old and
 !! new pressure alone. Else columns of viscous liquid made a thousand times the energy that they had
 !! (docs/decisions/surface.md). Cells at an outflow do not take part either: the drag of the
 !! side, half of which they take (`predict_face_velocity`), is no part of it.
@@ -34,7 +34,7 @@ module half_kick_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: find_liquid, find_first_half, add_first_half, add_second_half, add_whole
+  public :: find_liquid, find_first_half, add_first_half, change_where
   public :: force_of_half_kick
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
@@ -90,27 +90,8 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine add_first_half
 
-  !> The second half of weight and old pressure in the cells that take part.
-  subroutine add_second_half(grid, dt, a, u)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt   !! [s]
-    type(acceleration_t), intent(in) :: a
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-
-    call change_where(grid, a%kicked, .true., u, 0.5_wp*dt, a%cell)
-  end subroutine add_second_half
-
-  !> Weight and old pressure in all other cells.
-  subroutine add_whole(grid, dt, a, u)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt   !! [s]
-    type(acceleration_t), intent(in) :: a
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-
-    call change_where(grid, a%kicked, .false., u, dt, a%cell)
-  end subroutine add_whole
-
-  !> u += time a, or u = 0 without a, in the own cells that take part or in those that do not.
+  !> u += time a, or u = 0 without a, in the own cells that take part or in those that do not: the
+  !! second half of weight and old pressure in the ones, the whole of it in the others.
   subroutine change_where(grid, takes_part, those, u, time, a)
     type(grid_t), intent(in) :: grid
     logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)

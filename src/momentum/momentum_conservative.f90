@@ -20,7 +20,8 @@ module momentum_conservative_m
   use mixture_m, only: pure_share, mass_through
   use tvd_m, only: face_row, scheme_of, mp_scheme
   use carried_volumes_m, only: carried_volumes_t
-  use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
+  use liquid_transport_m, only: liquid_transport_t, small_cells
+  use liquid_sweep_m, only: sweep_volumes
   use small_cells_m, only: implicit_values, move_implicit
   implicit none
   private
@@ -108,7 +109,7 @@ contains
     type(momentum_t), intent(inout) :: self
     integer :: k, me, e(3), low, high, at_hand   ! place of the lower and of the upper faces
 
-    call sweep(grid, old, d, transport)
+    call sweep_volumes(grid, old, d, transport%volumes, transport%sweeps)
     ! The momentum after what crosses the faces in direction d. A thread goes through its planes one
     ! by one and keeps what crosses the faces of two.
     e = unit_step(:, d)

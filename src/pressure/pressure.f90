@@ -194,44 +194,32 @@ contains
     real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
                                                    grid%lo(3) - 1:)
     real(wp), intent(out) :: largest
-    real(wp) :: worst(1)
-
-    call net_outflow(grid, aperture, flow%uf, flow%solid_flux, active, outflow, worst(1))
-    call global_max(worst)
-    largest = worst(1)/grid%volume
-  end subroutine divergence
-
-  !> The same on this process; `worst` is the largest outflow [m3/s].
-  subroutine net_outflow(grid, aperture, uf, solid_flux, active, outflow, worst)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: aperture, uf, solid_flux
-    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
-                                                   grid%lo(3) - 1:)
-    real(wp), intent(out) :: worst
     integer :: i, j, k
-    real(wp) :: a(3)
+    real(wp) :: a(3), worst(1)
 
     a = grid%area
     worst = 0.0_wp
-    !$omp parallel do private(i, j) reduction(max: worst) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        !$omp simd
-        do i = grid%lo(1), grid%hi(1)
-          outflow(i, j, k) = merge( &
-            (aperture(i + 1, j, k, 1)*a(1)*uf(i + 1, j, k, 1) + solid_flux(i + 1, j, k, 1)) &
-            - (aperture(i, j, k, 1)*a(1)*uf(i, j, k, 1) + solid_flux(i, j, k, 1)) &
-            + (aperture(i, j + 1, k, 2)*a(2)*uf(i, j + 1, k, 2) + solid_flux(i, j + 1, k, 2)) &
-            - (aperture(i, j, k, 2)*a(2)*uf(i, j, k, 2) + solid_flux(i, j, k, 2)) &
-            + (aperture(i, j, k + 1, 3)*a(3)*uf(i, j, k + 1, 3) + solid_flux(i, j, k + 1, 3)) &
-            - (aperture(i, j, k, 3)*a(3)*uf(i, j, k, 3) + solid_flux(i, j, k, 3)), 0.0_wp, &
-            active(i, j, k))
+    associate (uf => flow%uf, solid_flux => flow%solid_flux)
+      !$omp parallel do private(i, j) reduction(max: worst) schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          !$omp simd
+          do i = grid%lo(1), grid%hi(1)
+            outflow(i, j, k) = merge( &
+              (aperture(i + 1, j, k, 1)*a(1)*uf(i + 1, j, k, 1) + solid_flux(i + 1, j, k, 1)) &
+              - (aperture(i, j, k, 1)*a(1)*uf(i, j, k, 1) + solid_flux(i, j, k, 1)) &
+              + (aperture(i, j + 1, k, 2)*a(2)*uf(i, j + 1, k, 2) + solid_flux(i, j + 1, k, 2)) &
+              - (aperture(i, j, k, 2)*a(2)*uf(i, j, k, 2) + solid_flux(i, j, k, 2)) &
+              + (aperture(i, j, k + 1, 3)*a(3)*uf(i, j, k + 1, 3) + solid_flux(i, j, k + 1, 3)) &
+              - (aperture(i, j, k, 3)*a(3)*uf(i, j, k, 3) + solid_flux(i, j, k, 3)), 0.0_wp, &
+              active(i, j, k))
+          end do
+          worst = max(worst, maxval(abs(outflow(grid%lo(1):grid%hi(1), j, k))))
         end do
-        worst = max(worst, maxval(abs(outflow(grid%lo(1):grid%hi(1), j, k))))
       end do
-    end do
-  end subroutine net_outflow
+    end associate
+    call global_max(worst)
+    largest = worst(1)/grid%volume
+  end subroutine divergence
 
 end module pressure_m

@@ -134,7 +134,17 @@ contains
         end do
       end do
     end do
-    call mark_active(grid, self%operator%cf, self%active)
+    associate (cf => self%operator%cf)   ! own cells with a face through which fluid can move
+      !$omp parallel do private(i, j) schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            self%active(i, j, k) = cf(i, j, k, 1) + cf(i + 1, j, k, 1) + cf(i, j, k, 2) &
+              + cf(i, j + 1, k, 2) + cf(i, j, k, 3) + cf(i, j, k + 1, 3) > 0.0_wp
+          end do
+        end do
+      end do
+    end associate
     call take_all_cells(self%solver%work)
     call find_null_space(grid, self%operator%cf, self%solver%work)
     select case (trim(self%preconditioner))
@@ -143,24 +153,6 @@ contains
     case default   ! 'none' needs nothing
     end select
   end subroutine set_pressure_system
-
-  !> Own cells that have a face through which fluid can move.
-  subroutine mark_active(grid, cf, active)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: cf(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:, :)
-    logical, intent(inout), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
-
-    !$omp parallel do private(i, j) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          active(i, j, k) = cf(i, j, k, 1) + cf(i + 1, j, k, 1) + cf(i, j, k, 2) &
-                            + cf(i, j + 1, k, 2) + cf(i, j, k, 3) + cf(i, j, k + 1, 3) > 0.0_wp
-        end do
-      end do
-    end do
-  end subroutine mark_active
 
   !> The bodies that a pressure moves.
   !!

@@ -101,21 +101,15 @@ contains
     real(wp), intent(in) :: r_max
     real(wp), intent(inout), contiguous :: z(:, :, :)
 
+    integer :: k, below
+
     associate (unused => r_max)
     end associate
-    call multiply(self%inverse, r, z)
-  end subroutine apply_jacobi
-
-  !> z = d r, cell by cell.
-  subroutine multiply(d, r, z)
-    real(wp), intent(in), contiguous :: d(:, :, :), r(:, :, :)
-    real(wp), intent(inout), contiguous :: z(:, :, :)
-    integer :: k
-
+    below = lbound(self%inverse, 3) - 1
     !$omp parallel do schedule(static) if (size(r) > worth_threads)
     do k = 2, size(r, 3) - 1
-      z(:, :, k) = d(:, :, k)*r(:, :, k)
+      z(:, :, k) = self%inverse(:, :, below + k)*r(:, :, k)
     end do
-  end subroutine multiply
+  end subroutine apply_jacobi
 
 end module linear_operator_m

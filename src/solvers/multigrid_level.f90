@@ -250,62 +250,47 @@ contains
     end do
   end subroutine sum_lines
 
-  !> Take a line of the right side. The unknown is what a first half sweep over colour 0 makes of
-  !! zero: the right side there and zero in the other colour, which is relaxed next from colour 0
-  !! alone, unless cells of equal colour touch.
+  !> Take a line of the right side, scaled. The unknown is what a first half sweep over colour 0
+  !! makes of zero: the right side there and zero in the other colour, which is relaxed next from
+  !! colour 0 alone, unless cells of equal colour touch.
   subroutine load_line(self, line, j, k)
     type(level_t), intent(inout) :: self
     real(sp), intent(in), contiguous :: line(:)   !! unscaled, two cells for each pair
     integer, intent(in) :: j, k
-    integer :: m
+    integer :: m, p
 
     if (self%line(1, j, k) > self%line(2, j, k)) return
-    call split_line(size(line)/2, line, self%s(:, :, j, k), self%b(:, :, j, k))
+    associate (a => self%a(1), b => self%b, s => self%s)
+      !$omp simd
+      do p = 1, size(line)/2
+        b(a + p, 1, j, k) = s(a + p, 1, j, k)*line(2*p - 1)
+        b(a + p, 2, j, k) = s(a + p, 2, j, k)*line(2*p)
+      end do
+    end associate
     m = 1 + modulo(j + k, 2)
     self%x(:, m, j, k) = self%b(:, m, j, k)
     if (self%seam) self%x(:, 3 - m, j, k) = 0.0_sp
   end subroutine load_line
-
-  !> A line of cells into odd and even ones, scaled.
-  pure subroutine split_line(pairs, line, s, b)
-    integer, intent(in) :: pairs
-    real(sp), intent(in) :: line(2*pairs), s(0:pairs + 1, 2)
-    real(sp), intent(inout) :: b(0:pairs + 1, 2)
-    integer :: p
-
-    !$omp simd
-    do p = 1, pairs
-      b(p, 1) = s(p, 1)*line(2*p - 1)
-      b(p, 2) = s(p, 2)*line(2*p)
-    end do
-  end subroutine split_line
 
   !> Give a line of the unscaled unknown.
   subroutine unload_line(self, line, j, k)
     type(level_t), intent(in) :: self
     real(sp), intent(inout), contiguous :: line(:)   !! two cells for each pair
     integer, intent(in) :: j, k
+    integer :: p
 
     if (self%line(1, j, k) > self%line(2, j, k)) then
       line = 0.0_sp
-    else
-      call join_line(size(line)/2, self%s(:, :, j, k), self%x(:, :, j, k), line)
+      return
     end if
+    associate (a => self%a(1), s => self%s, x => self%x)
+      !$omp simd
+      do p = 1, size(line)/2
+        line(2*p - 1) = s(a + p, 1, j, k)*x(a + p, 1, j, k)
+        line(2*p) = s(a + p, 2, j, k)*x(a + p, 2, j, k)
+      end do
+    end associate
   end subroutine unload_line
-
-  !> Odd and even cells into one line, scaled.
-  pure subroutine join_line(pairs, s, x, line)
-    integer, intent(in) :: pairs
-    real(sp), intent(in) :: s(0:pairs + 1, 2), x(0:pairs + 1, 2)
-    real(sp), intent(inout) :: line(2*pairs)
-    integer :: p
-
-    !$omp simd
-    do p = 1, pairs
-      line(2*p - 1) = s(p, 1)*x(p, 1)
-      line(2*p) = s(p, 2)*x(p, 2)
-    end do
-  end subroutine join_line
 
   !> Gauss-Seidel update of the cells of one colour in plane k.
   subroutine relax_plane(self, colour, k)

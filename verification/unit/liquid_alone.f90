@@ -5,8 +5,9 @@ module liquid_alone_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
-  use liquid_transport_m, only: liquid_transport_t, begin_transport, begin_subcycle, sweep, &
+  use liquid_transport_m, only: liquid_transport_t, begin_transport, begin_subcycle, &
                                 small_cells, finish_transport
+  use liquid_sweep_m, only: sweep_volumes
   implicit none
   private
   public :: transport_liquid
@@ -29,7 +30,7 @@ contains
     do subcycle = 1, self%subcycles
       call begin_subcycle(grid, old, subcycle, step, self)
       do n = 1, 3
-        call sweep(grid, old, self%order(n), self)
+        call sweep_volumes(grid, old, self%order(n), self%volumes, self%sweeps)
       end do
       call small_cells(grid, self)
     end do

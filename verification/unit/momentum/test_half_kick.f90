@@ -3,7 +3,7 @@
 module test_half_kick_m
   use check_m, only: check, wp
   use grid_m, only: n_halo
-  use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole
+  use half_kick_m, only: find_liquid, find_first_half, add_first_half, change_where
   use advected_pressure_m, only: advect_pressure
   use mixture_m, only: mix_fluid, mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration
@@ -79,10 +79,10 @@ contains
       a%cell(:, :, :, i) = gain(i)/dt
     end do
     before = box%flow%u
-    call add_second_half(box%grid, dt, a, box%flow%u)
+    call change_where(box%grid, a%kicked, .true., box%flow%u, 0.5_wp*dt, a%cell)
     call check('liquid: the other half', change(7, 3, 2) - 0.5_wp*gain, 0.0_wp, 1.0e-14_wp)
     call check('not at the surface', maxval([abs(change(7, 6, 5)), abs(change(6, 5, 4))]), 0.0_wp)
-    call add_whole(box%grid, dt, a, box%flow%u)
+    call change_where(box%grid, a%kicked, .false., box%flow%u, dt, a%cell)
     call check('liquid: no more', change(7, 3, 2) - 0.5_wp*gain, 0.0_wp, 1.0e-14_wp)
     call check('the whole at the surface', change(7, 6, 5) - gain, 0.0_wp, 1.0e-14_wp)
     call check('and beside it', change(6, 5, 4) - gain, 0.0_wp, 1.0e-14_wp)
