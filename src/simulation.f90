@@ -12,7 +12,7 @@ module simulation_m
   use extended_fraction_m, only: extend_fraction
   use fluid_transport_m, only: fluid_transport_t, fluid_transport_init
   use mixture_m, only: mix_fluid
-  use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
+  use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: lowering, kinetic_energy, potential_energy
@@ -155,8 +155,8 @@ contains
     call fill_scalar_halo(sim%grid, sim%flow%fluid_volume)
     call fill_scalar_halo(sim%grid, sim%flow%c)
     call mix_fluid(sim%case%fluid, sim%flow)
-    call resume_outflow(sim%grid, sim%case%fluid, sim%clock%dt, sim%flow%c, sim%flow%uf, &
-                        sim%flow%sides)
+    call update_outflow(sim%grid, sim%case%fluid, sim%clock%dt, sim%flow%c, sim%flow%uf, &
+                        sim%flow%sides, resumed=.true.)
   end subroutine resume
 
   !> Sums over the fluid before the first step of a run, or after a restart; of a run that begins,

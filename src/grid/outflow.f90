@@ -21,7 +21,7 @@ module outflow_m
   use parallel_m, only: global_max
   implicit none
   private
-  public :: outflow_t, outflow_init, start_outflow, update_outflow, resume_outflow
+  public :: outflow_t, outflow_init, start_outflow, update_outflow
   public :: side_distance, pressure_outside, mean_velocity
 
   real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
@@ -51,7 +51,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(outflow_t), intent(out) :: sides(2, 3)
-    integer :: s, d, n(2)
+    integer :: s, d, n(2), axis
 
     do d = 1, 3
       do s = 1, 2
@@ -61,32 +61,23 @@ contains
           n = merge(grid%n(side%along), 0, side%active)
           allocate (side%c(n(1), n(2)), side%velocity(n(1), n(2)), side%mean(n(1), n(2)), &
                     side%pressure(n(1), n(2)), side%impulse(n(1), n(2)), source=0.0_wp)
-          if (side%active) call set_vertical(grid, fluid, d, side)
+          if (.not. side%active .or. .not. any(abs(fluid%gravity) > 0.0_wp)) cycle
+          ! Where up is, how deep the water, and with it the speed of long waves.
+          axis = maxloc(abs(fluid%gravity), 1)
+          side%up = findloc(side%along, axis, 1)
+          side%upward = fluid%gravity(axis) < 0.0_wp
+          side%levelled = is_given(fluid%water_level) .and. .not. fluid%single_phase &
+                          .and. side%up > 0
+          if (.not. side%levelled) cycle
+          side%depth = fluid%water_level - grid%origin(axis)
+          if (.not. side%upward) side%depth = grid%length(axis) - side%depth
+          if (side%depth <= 0.0_wp) cycle
+          side%celerity = sqrt(abs(fluid%gravity(axis))*side%depth)
+          side%memory = 4.0_wp*grid%length(d)/side%celerity
         end associate
       end do
     end do
   end subroutine outflow_init
-
-  !> Where up is, how deep the water, and with it the speed of long waves.
-  pure subroutine set_vertical(grid, fluid, d, side)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: d
-    type(outflow_t), intent(inout) :: side
-    integer :: axis
-
-    if (.not. any(abs(fluid%gravity) > 0.0_wp)) return
-    axis = maxloc(abs(fluid%gravity), 1)
-    side%up = findloc(side%along, axis, 1)
-    side%upward = fluid%gravity(axis) < 0.0_wp
-    side%levelled = is_given(fluid%water_level) .and. .not. fluid%single_phase .and. side%up > 0
-    if (.not. side%levelled) return
-    side%depth = fluid%water_level - grid%origin(axis)
-    if (.not. side%upward) side%depth = grid%length(axis) - side%depth
-    if (side%depth <= 0.0_wp) return
-    side%celerity = sqrt(abs(fluid%gravity(axis))*side%depth)
-    side%memory = 4.0_wp*grid%length(d)/side%celerity
-  end subroutine set_vertical
 
   !> The mean velocity of the start is that of the faces.
   subroutine start_outflow(grid, c, uf, sides)
@@ -107,59 +98,36 @@ contains
     end do
   end subroutine start_outflow
 
-  !> Pressure outside for a step of dt, from the liquid of its end and the velocity of its start.
-  subroutine update_outflow(grid, fluid, dt, c, uf, sides)
+  !> Pressure outside for a step of dt, from the liquid of its end and the velocity of its start,
+  !! and what a velocity beyond the mean adds to it.
+  subroutine update_outflow(grid, fluid, dt, c, uf, sides, resumed)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(outflow_t), intent(inout) :: sides(2, 3)
+    logical, intent(in), optional :: resumed
+      !! the step has been, velocity and mean are those that it left; default: no
     integer :: s, d
+    logical :: follow
 
+    follow = .true.
+    if (present(resumed)) follow = .not. resumed
     do d = 1, 3
       do s = 1, 2
         associate (side => sides(s, d))
           if (.not. side%active) cycle
           call gather(grid, s, d, c, uf, side)
-          if (side%memory > 0.0_wp) then
+          if (follow .and. side%memory > 0.0_wp) then
             side%mean = side%mean + dt/(side%memory + dt)*side%c*(side%velocity - side%mean)
           end if
-          call set_outside(grid, fluid, dt, side)
+          side%impulse = dt*side%c*fluid%liquid_density*side%celerity
+          call set_pressure(grid, fluid, side)
         end associate
       end do
     end do
   end subroutine update_outflow
-
-  !> What is outside the sides after a step of dt, from the state that it left.
-  subroutine resume_outflow(grid, fluid, dt, c, uf, sides)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    type(outflow_t), intent(inout) :: sides(2, 3)   !! with their mean velocities
-    integer :: s, d
-
-    do d = 1, 3
-      do s = 1, 2
-        if (.not. sides(s, d)%active) cycle
-        call gather(grid, s, d, c, uf, sides(s, d))
-        call set_outside(grid, fluid, dt, sides(s, d))
-      end do
-    end do
-  end subroutine resume_outflow
-
-  !> Pressure outside a side, and what a velocity beyond the mean adds to it in a step of dt.
-  pure subroutine set_outside(grid, fluid, dt, side)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in) :: dt   !! [s]
-    type(outflow_t), intent(inout) :: side
-
-    side%impulse = dt*side%c*fluid%liquid_density*side%celerity
-    call set_pressure(grid, fluid, side)
-  end subroutine set_outside
 
   !> Liquid shares and outward velocities of a side, from the processes that touch it.
   subroutine gather(grid, s, d, c, uf, side)

@@ -99,6 +99,7 @@ contains
   subroutine add_piece(apex, p, q, r, sense, self)
     real(wp), intent(in) :: apex(3), p(3), q(3), r(3), sense
     type(cut_cell_t), intent(inout) :: self
+    real(wp), allocatable :: corners(:, :, :), shares(:)
     real(wp) :: corner(3, 4), share
 
     corner(:, 1) = apex
@@ -107,25 +108,19 @@ contains
     corner(:, 4) = r
     share = tet_volume(corner)
     if (share < min_piece) return
-    if (self%n == size(self%share)) call grow(self)
+    if (self%n == size(self%share)) then   ! twice the room
+      allocate (corners(3, 4, 2*self%n), shares(2*self%n))
+      corners(:, :, 1:self%n) = self%corner
+      shares(1:self%n) = self%share
+      call move_alloc(corners, self%corner)
+      call move_alloc(shares, self%share)
+      deallocate (self%height)
+      allocate (self%height(4, 2*self%n))
+    end if
     self%n = self%n + 1
     self%share(self%n) = sense*share
     self%corner(:, :, self%n) = corner
   end subroutine add_piece
-
-  !> Twice the room for pieces.
-  subroutine grow(self)
-    type(cut_cell_t), intent(inout) :: self
-    real(wp), allocatable :: corner(:, :, :), share(:)
-
-    allocate (corner(3, 4, 2*self%n), share(2*self%n))
-    corner(:, :, 1:self%n) = self%corner(:, :, 1:self%n)
-    share(1:self%n) = self%share(1:self%n)
-    call move_alloc(corner, self%corner)
-    call move_alloc(share, self%share)
-    deallocate (self%height)
-    allocate (self%height(4, 2*self%n))
-  end subroutine grow
 
   !> Open share of the box where `m.x <= a`.
   subroutine open_below(self, m, a, share)

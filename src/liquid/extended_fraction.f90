@@ -41,15 +41,6 @@ module extended_fraction_m
     type(cut_cell_t), allocatable :: cut(:) !! one per thread, from 0
   end type extended_fraction_t
 
-  !> A cut cell that asks for its C^.
-  type :: cut_liquid_t
-    integer :: at(3) = 0
-    real(wp) :: share = 0.0_wp        !! liquid share of its open part
-    real(wp) :: row = 0.0_wp          !! value that the row offers
-    logical :: accepted = .false.     !! that value is good for it
-    real(wp) :: own = 0.0_wp          !! else: share below its own plane
-  end type cut_liquid_t
-
 contains
 
   !> The vertical is the main axis of gravity.
@@ -240,20 +231,14 @@ contains
     type(extended_fraction_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, at(3)
-    type(cut_liquid_t) :: cell
 
-    !$omp parallel do private(at, cell) schedule(dynamic, 8)
+    !$omp parallel do private(at) schedule(dynamic, 8)
     do l = 1, self%n
       at = self%cell(:, l)
       if (nearly_solid(solid, at)) self%has_plane(l) = .false.
       if (.not. self%has_plane(l)) cycle
-      cell%at = at
-      cell%share = liquid_share(liquid(at(1), at(2), at(3)), fluid_volume(at(1), at(2), at(3)))
-      cell%row = c(at(1), at(2), at(3))
-      call share_of_cut_cell(grid, solid, self%vertical, may_accept, c, &
-                             self%cut(omp_get_thread_num()), cell)
-      self%value(l) = cell%own
-      if (cell%accepted) self%has_plane(l) = .false.
+      call share_of_cut_cell(grid, solid, liquid_share(liquid(at(1), at(2), at(3)), &
+        fluid_volume(at(1), at(2), at(3))), may_accept, c, l, self)
     end do
     do l = 1, self%n
       at = self%cell(:, l)
@@ -262,40 +247,41 @@ contains
     call halo_exchange(c, n_halo, layers=1)
   end subroutine planes_of_cut_cells
 
-  !> Is the row's value good for the cut cell, and which share lies below its own plane if not?
-  subroutine share_of_cut_cell(grid, solid, vertical, may_accept, c, cut, cell)
+  !> Cell l of the list: is the row's value, which stands in c, good for it (then it has no plane),
+  !! and which share lies below its own plane if not?
+  subroutine share_of_cut_cell(grid, solid, share, may_accept, c, l, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(vertical_t), intent(in) :: vertical
+    real(wp), intent(in) :: share         !! liquid share of its open part
     logical, intent(in) :: may_accept
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-    type(cut_cell_t), intent(inout) :: cut
-    type(cut_liquid_t), intent(inout) :: cell
-    real(wp) :: m(3), a, held, open
+    integer, intent(in) :: l
+    type(extended_fraction_t), intent(inout) :: self
+    real(wp) :: m(3), a, held, open, row
 
-    associate (at => cell%at, share => cell%share, row => cell%row)
-      cell%accepted = .false.
-      cell%own = share
+    associate (at => self%cell(:, l), cut => self%cut(omp_get_thread_num()))
+      self%value(l) = share
+      row = c(at(1), at(2), at(3))
       open = 1.0_wp - solid%alpha(at(1), at(2), at(3))
-      if (may_accept .and. row <= same_liquid) cell%accepted = share*open <= same_liquid
-      if (may_accept .and. row >= 1.0_wp - same_liquid) then
-        cell%accepted = (1.0_wp - share)*open <= same_liquid
+      if (may_accept .and. ((row <= same_liquid .and. share*open <= same_liquid) .or. &
+          (row >= 1.0_wp - same_liquid .and. (1.0_wp - share)*open <= same_liquid))) then
+        self%has_plane(l) = .false.
+        return
       end if
-      if (cell%accepted) return
       if (row <= same_liquid .or. row >= 1.0_wp - same_liquid) then
         if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
       end if
-      m = surface_normal(grid, solid, vertical, c, at(1), at(2), at(3))
+      m = surface_normal(grid, solid, self%vertical, c, at(1), at(2), at(3))
       call load_cut_cell(solid, solid%cut(at(1), at(2), at(3)), grid%face(at, [1, 2, 3]), grid%h, &
                          cut)
       if (may_accept .and. row > 0.0_wp .and. row < 1.0_wp) then
         call open_below(cut, m, unit_constant(m, row), held)
-        cell%accepted = abs(held - share*cut%open) <= same_liquid
-        if (cell%accepted) return
+        self%has_plane(l) = .not. abs(held - share*cut%open) <= same_liquid
+        if (.not. self%has_plane(l)) return
       end if
       if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
       call open_constant(cut, m, share*cut%open, a)
-      cell%own = unit_volume(m, a)
+      self%value(l) = unit_volume(m, a)
     end associate
   end subroutine share_of_cut_cell
 

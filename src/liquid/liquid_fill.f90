@@ -50,11 +50,27 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(flow_t), intent(inout) :: flow
     type(cut_cell_t) :: cut
+    type(vertical_t) :: vertical
     real(wp) :: low(3, size(water) + 1), high(3, size(water) + 1)
-    integer :: i, j, k
+    integer :: i, j, k, m, axis
 
     call cut_cell_init(cut)
-    call boxes_of_liquid(grid, fluid, water, low, high)
+    ! The boxes of the case, and the level as a box without other bounds.
+    do m = 1, size(water)
+      low(:, m) = water(m)%min
+      high(:, m) = water(m)%max
+    end do
+    m = size(water) + 1
+    low(:, m) = grid%origin - grid%length
+    high(:, m) = grid%origin + 2.0_wp*grid%length
+    vertical = vertical_of(fluid%gravity)
+    axis = maxloc(abs(vertical%up), 1)
+    if (vertical%up(axis) > 0.0_wp) then
+      high(axis, m) = fluid%water_level
+    else
+      low(axis, m) = fluid%water_level
+    end if
+    if (fluid%water_level <= absent) high(:, m) = low(:, m)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
@@ -92,32 +108,6 @@ contains
     end function share_in_boxes
   end subroutine fill_liquid
 
-  !> The level as a box without other bounds, and the boxes of the case.
-  pure subroutine boxes_of_liquid(grid, fluid, water, low, high)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    type(water_t), intent(in) :: water(:)
-    real(wp), intent(out) :: low(:, :), high(:, :)   !! (3, boxes + 1) [m]
-    type(vertical_t) :: vertical
-    integer :: m, axis
-
-    do m = 1, size(water)
-      low(:, m) = water(m)%min
-      high(:, m) = water(m)%max
-    end do
-    m = size(water) + 1
-    low(:, m) = grid%origin - grid%length
-    high(:, m) = grid%origin + 2.0_wp*grid%length
-    vertical = vertical_of(fluid%gravity)
-    axis = maxloc(abs(vertical%up), 1)
-    if (vertical%up(axis) > 0.0_wp) then
-      high(axis, m) = fluid%water_level
-    else
-      low(axis, m) = fluid%water_level
-    end if
-    if (fluid%water_level <= absent) high(:, m) = low(:, m)
-  end subroutine boxes_of_liquid
-
   !> Open volume of a cell in the union of boxes, as a share of its open volume.
   !!
   !! The faces of all boxes cut the cell into bricks; each lies in a box or outside all.
@@ -128,8 +118,8 @@ contains
     real(wp), intent(in) :: a(:, :), b(:, :)    !! (3, n) boxes in shares of the cell, not empty
     type(cut_cell_t), intent(inout) :: cut
     real(wp), intent(out) :: share
-    real(wp) :: x(2*size(a, 2), 3), p(3), q(3), corner(3), total
-    integer :: n, m, d, i, j, k
+    real(wp) :: x(2*size(a, 2), 3), p(3), q(3), middle(3), corner(3), total
+    integer :: n, m, d, i, j, k, l
 
     n = size(a, 2)
     m = solid%cut(at(1), at(2), at(3))
@@ -148,23 +138,14 @@ contains
           p = [x(i, 1), x(j, 2), x(k, 3)]
           q = [x(i + 1, 1), x(j + 1, 2), x(k + 1, 3)]
           if (any(q <= p)) cycle
-          if (.not. in_a_box(0.5_wp*(p + q))) cycle
+          middle = 0.5_wp*(p + q)
+          if (.not. any([(all(middle > a(:, l) .and. middle < b(:, l)), l=1, n)])) cycle
           call load_cut_cell(solid, m, corner + grid%h*p, grid%h*(q - p), cut)
           share = share + cut%open*product(q - p)
         end do
       end do
     end do
     share = min(share/max(total, tiny(total)), 1.0_wp)
-  contains
-    pure logical function in_a_box(y)
-      real(wp), intent(in) :: y(3)
-      integer :: l
-
-      in_a_box = .false.
-      do l = 1, n
-        if (all(y > a(:, l) .and. y < b(:, l))) in_a_box = .true.
-      end do
-    end function in_a_box
   end subroutine open_union
 
   !> Rising order, in place.
@@ -307,11 +288,12 @@ contains
     !> Volume of a layer of this height; `gain` holds the share of each cell.
     real(wp) function layer_volume(height) result(total)
       real(wp), intent(in) :: height
-      integer :: n
+      integer :: n, other(2)
 
       do n = 1, size(gain)
+        other = pack(cell(:, n), [1, 2, 3] /= axis)   ! its column
         call layer_in_cell(grid, solid, vertical, cell(:, n), &
-                           surface_at(cell(:, n)) + [0.0_wp, height], cut, gain(n))
+                           surface(other(1), other(2)) + [0.0_wp, height], cut, gain(n))
         associate (at => cell(:, n))
           gain(n) = min(gain(n), flow%fluid_volume(at(1), at(2), at(3)) &
                         - flow%liquid(at(1), at(2), at(3)))
@@ -319,15 +301,6 @@ contains
       end do
       total = exact_sum(gain)
     end function layer_volume
-
-    !> Height of the surface in the column of a cell, along the vertical [m].
-    pure real(wp) function surface_at(at)
-      integer, intent(in) :: at(3)
-      integer :: other(2)
-
-      other = pack(at, [1, 2, 3] /= axis)
-      surface_at = surface(other(1), other(2))
-    end function surface_at
   end subroutine add_layer
 
   !> Open volume of a cell between two heights along the vertical [m3].
@@ -416,7 +389,7 @@ contains
     real(wp), intent(in) :: up, surface(:, :)
     type(flow_t), intent(in) :: flow
     integer, allocatable, intent(out) :: cell(:, :)   !! (3, *)
-    integer :: i, j, k, n, pass, other(2)
+    integer :: i, j, k, n, pass, other(2), at(3)
     real(wp) :: top
 
     do pass = 1, 2
@@ -427,7 +400,8 @@ contains
             if (flow%fluid_volume(i, j, k) <= flow%liquid(i, j, k)) cycle
             other = pack([i, j, k], [1, 2, 3] /= axis)
             if (surface(other(1), other(2)) <= no_surface) cycle
-            top = height_of_top([i, j, k])
+            at = [i, j, k]
+            top = max(up*grid%face(at(axis), axis), up*grid%face(at(axis) + 1, axis))
             if (top <= surface(other(1), other(2))) cycle
             n = n + 1
             if (pass == 2) cell(:, n) = [i, j, k]
@@ -436,12 +410,6 @@ contains
       end do
       if (pass == 1) allocate (cell(3, n))
     end do
-  contains
-    pure real(wp) function height_of_top(at)
-      integer, intent(in) :: at(3)
-
-      height_of_top = max(up*grid%face(at(axis), axis), up*grid%face(at(axis) + 1, axis))
-    end function height_of_top
   end subroutine cells_above
 
 end module liquid_fill_m

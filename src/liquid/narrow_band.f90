@@ -12,7 +12,7 @@ module narrow_band_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side
   use exact_sum_m, only: exact_add, exact_totals, accumulator_size, no_terms
-  use linear_operator_m, only: linear_operator_t
+  use linear_operator_m, only: linear_operator_t, seven_points
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
@@ -130,30 +130,8 @@ contains
     real(wp), intent(inout), contiguous :: y(:, :, :)
 
     call halo_exchange(x, 1)
-    call seven_points(self%line, self%k, x, y)
+    call seven_points(self%k, x, y, self%line)
   end subroutine apply_band
-
-  subroutine seven_points(line, cf, x, y)
-    integer, intent(in), contiguous :: line(:, :, :)
-    real(wp), intent(in), contiguous :: cf(:, :, :, :)
-    real(wp), intent(in), contiguous :: x(:, :, :)
-    real(wp), intent(inout), contiguous :: y(:, :, :)
-    integer :: i, j, k
-
-    !$omp parallel do private(i, j) schedule(static)
-    do k = 2, size(x, 3) - 1
-      do j = 2, size(x, 2) - 1
-        do i = line(1, j, k), line(2, j, k)
-          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
-                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
-                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
-                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
-                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
-                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
-        end do
-      end do
-    end do
-  end subroutine seven_points
 
   !> The range of each line in which cells conduct, for the operator and its solver.
   subroutine find_open_lines(cf, line)
@@ -272,7 +250,6 @@ contains
         if (changes(1) == 0_i8) exit
       end do
     end associate
-  contains
   end subroutine join_processes
 
   !> The labels of all parts on all processes, rising.

@@ -59,7 +59,7 @@ contains
       !! those of the velocity on entry [m3]
     logical :: balanced
     type(solve_report_t) :: report   ! the next step makes good what is left
-    integer :: k, l
+    integer :: d, e(3), i, j, k, l
 
     self%iterations = 0
     self%residual = 0.0_wp
@@ -103,7 +103,19 @@ contains
     call halo_exchange(solver%x, 1)
     self%iterations = report%iterations
     self%residual = report%residual
-    call correct_flux(grid, self%band, solver%x, q)
+    ! Take the gradient of the potential from the volumes.
+    do d = 1, 3
+      e = unit_step(:, d)
+      !$omp parallel do private(i, j) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            q(i, j, k, d) = q(i, j, k, d) - grid%volume*self%band%k(i, j, k, d) &
+                            *(solver%x(i, j, k) - solver%x(i - e(1), j - e(2), k - e(3)))
+          end do
+        end do
+      end do
+    end do
   end subroutine fit_to_bodies
 
   !> The narrow band, its conductances and parts; no parts without solids. If the bodies are where
@@ -361,27 +373,5 @@ contains
       end do
     end associate
   end subroutine balance_parts
-
-  !> Take the gradient of the potential from the volumes.
-  subroutine correct_flux(grid, band, phi, q)
-    type(grid_t), intent(in) :: grid
-    type(narrow_band_t), intent(in) :: band
-    real(wp), intent(in), contiguous :: phi(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
-    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: d, i, j, k, e(3)
-
-    do d = 1, 3
-      e = unit_step(:, d)
-      !$omp parallel do private(i, j) schedule(static)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          do i = grid%lo(1), grid%hi(1) + e(1)
-            q(i, j, k, d) = q(i, j, k, d) - grid%volume*band%k(i, j, k, d) &
-                            *(phi(i, j, k) - phi(i - e(1), j - e(2), k - e(3)))
-          end do
-        end do
-      end do
-    end do
-  end subroutine correct_flux
 
 end module open_flux_m

@@ -96,12 +96,26 @@ contains
     type(grid_t), intent(in) :: grid
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
-    integer :: d, i, j, k, n, e(3), up(3), low(3), donor(3)
+    integer :: d, i, j, k, m, n, e(3), up(3), low(3), donor(3)
 
-    n = 0
+    m = 0
     do d = 1, 3
       e = unit_step(:, d)
-      call count_implicit_faces(grid, d, volumes%q(:, :, :, d), self%number, self%implicit_in_row)
+      associate (q => volumes%q, number => self%number)   ! how many there are in each row
+        !$omp parallel do private(i, j, n) schedule(static)
+        do k = grid%lo(3), grid%hi(3) + e(3)
+          do j = grid%lo(2), grid%hi(2) + e(2)
+            n = 0
+            !$omp simd reduction(+: n)
+            do i = grid%lo(1), grid%hi(1) + e(1)
+              n = n + merge(1, 0, &
+                (q(i, j, k, d) > 0.0_wp .and. number(i - e(1), j - e(2), k - e(3)) > 0) &
+                .or. (q(i, j, k, d) < 0.0_wp .and. number(i, j, k) > 0))
+            end do
+            self%implicit_in_row(j, k) = n
+          end do
+        end do
+      end associate
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           if (self%implicit_in_row(j, k) == 0) cycle
@@ -111,49 +125,24 @@ contains
             low = up - e
             donor = merge(low, up, volumes%q(i, j, k, d) > 0.0_wp)
             if (self%number(donor(1), donor(2), donor(3)) == 0) cycle
-            n = n + 1
-            call ensure_capacity(n, self%face)
-            call ensure_capacity(n, self%donor)
-            call ensure_capacity(n, self%receiver)
-            call ensure_capacity(n, self%q_implicit)
-            self%face(:, n) = [i, j, k, d]
-            self%donor(:, n) = donor
-            self%receiver(:, n) = up + low - donor
-            self%q_implicit(n) = volumes%q(i, j, k, d)
+            m = m + 1
+            call ensure_capacity(m, self%face)
+            call ensure_capacity(m, self%donor)
+            call ensure_capacity(m, self%receiver)
+            call ensure_capacity(m, self%q_implicit)
+            self%face(:, m) = [i, j, k, d]
+            self%donor(:, m) = donor
+            self%receiver(:, m) = up + low - donor
+            self%q_implicit(m) = volumes%q(i, j, k, d)
             volumes%q(i, j, k, d) = 0.0_wp
           end do
         end do
       end do
     end do
-    self%n_implicit = n
-    call ensure_capacity(n, self%q_implicit)
-    call ensure_capacity(n, self%g_implicit)
+    self%n_implicit = m
+    call ensure_capacity(m, self%q_implicit)
+    call ensure_capacity(m, self%g_implicit)
   end subroutine find_implicit_faces
-
-  !> How many faces of direction d have a small donor, in each row.
-  subroutine count_implicit_faces(grid, d, q, number, in_row)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: d
-    real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! volume through the lower faces [m3]
-    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(inout), contiguous :: in_row(grid%lo(2):, grid%lo(3):)
-    integer :: i, j, k, n, e(3)
-
-    e = unit_step(:, d)
-    !$omp parallel do private(i, j, n) schedule(static)
-    do k = grid%lo(3), grid%hi(3) + e(3)
-      do j = grid%lo(2), grid%hi(2) + e(2)
-        n = 0
-        !$omp simd reduction(+: n)
-        do i = grid%lo(1), grid%hi(1) + e(1)
-          n = n + merge(1, 0, (q(i, j, k) > 0.0_wp .and. number(i - e(1), j - e(2), k - e(3)) > 0) &
-                        .or. (q(i, j, k) < 0.0_wp .and. number(i, j, k) > 0))
-        end do
-        in_row(j, k) = n
-      end do
-    end do
-  end subroutine count_implicit_faces
 
   !> The small cells give what they hold once all has come in: w, v, q and g are complete.
   subroutine give_small_cells(grid, volumes, self, share)
@@ -220,47 +209,29 @@ contains
     real(wp), intent(inout), contiguous :: value(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of small cells
     integer(i8) :: faces(1)
-    integer :: it
+    integer :: it, l, s, at(3)
     real(wp) :: change(2)   ! largest change and largest value of a pass
 
     self%iterations = 0
     faces = int(self%n_implicit, i8)
     call global_sum(faces)
     if (faces(1) == 0_i8) return
-    call first_values()
+    ! What they hold after the sweeps, and their mass with all that comes in.
+    do s = 1, self%n
+      at = self%cell(:, s)
+      self%mass(s) = mass(at(1), at(2), at(3))
+      value(at(1), at(2), at(3)) = 0.0_wp
+      if (self%mass(s) > 0.0_wp) then
+        value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
+      end if
+    end do
+    do l = 1, self%n_implicit
+      s = number_of(self%receiver(:, l))
+      if (s > 0) self%mass(s) = self%mass(s) + weight(l)
+    end do
     do it = 1, max_implicit_iterations
       call halo_exchange(value, n_halo, layers=1)
-      call next_values()
-      call global_max(change)
-      self%iterations = it
-      if (change(1) <= max(implicit_tolerance*change(2), tiny(1.0_wp))) exit
-    end do
-    if (it > max_implicit_iterations) self%converged = .false.
-    call halo_exchange(value, n_halo, layers=1)
-  contains
-    !> What they hold after the sweeps, and their mass with all that comes in.
-    subroutine first_values()
-      integer :: l, s, at(3)
-
-      do s = 1, self%n
-        at = self%cell(:, s)
-        self%mass(s) = mass(at(1), at(2), at(3))
-        value(at(1), at(2), at(3)) = 0.0_wp
-        if (self%mass(s) > 0.0_wp) then
-          value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
-        end if
-      end do
-      do l = 1, self%n_implicit
-        s = number_of(self%receiver(:, l))
-        if (s > 0) self%mass(s) = self%mass(s) + weight(l)
-      end do
-    end subroutine first_values
-
-    !> One pass over the cells, and how much it changes.
-    subroutine next_values()
-      integer :: l, s, at(3)
-
-      do s = 1, self%n
+      do s = 1, self%n   ! one pass over the cells, and how much it changes
         at = self%cell(:, s)
         self%amount(s) = amount(at(1), at(2), at(3))
       end do
@@ -279,8 +250,13 @@ contains
         change(2) = max(change(2), abs(self%ratio(s)))
         value(at(1), at(2), at(3)) = self%ratio(s)
       end do
-    end subroutine next_values
-
+      call global_max(change)
+      self%iterations = it
+      if (change(1) <= max(implicit_tolerance*change(2), tiny(1.0_wp))) exit
+    end do
+    if (it > max_implicit_iterations) self%converged = .false.
+    call halo_exchange(value, n_halo, layers=1)
+  contains
     !> Number of the small cell at this place if it is a cell of this process, else 0.
     pure integer function number_of(at)
       integer, intent(in) :: at(3)

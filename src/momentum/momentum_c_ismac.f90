@@ -33,7 +33,7 @@ module momentum_c_ismac_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, mp_scheme
   use viscous_system_m, only: viscous_t
-  use viscous_m, only: apply_viscous, force_of_links, velocity_scale, inertial_momentum
+  use viscous_m, only: apply_viscous, pull_of_links, velocity_scale, inertial_momentum
   use linear_operator_m, only: linear_operator_t, identity_t
   use solve_control_m, only: solve_control_t, solve_report_t, solved
   use krylov_m, only: krylov_work_t, krylov_init, bicgstab
@@ -214,7 +214,7 @@ contains
       if (bodies%free(b)) bodies%motion(:, b) = motion(:, b) &
         + matmul(self%operator%mobility(:, :, b), pull_of_walls(self%operator, b))
     end do
-    call force_of_links(bodies, flow, viscous)
+    call pull_of_links(viscous, flow%u, bodies%motion, viscous%force)
   end subroutine solve_predictor
 
   !> Coefficients of the left side from the viscous links and the inflow of each cell.

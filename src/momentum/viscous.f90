@@ -20,7 +20,7 @@ module viscous_m
   implicit none
   private
   public :: solve_viscous
-  public :: apply_viscous, force_of_links, velocity_scale, inertial_momentum   ! for C-ISMAC
+  public :: apply_viscous, pull_of_links, velocity_scale, inertial_momentum   ! for C-ISMAC
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
   real(wp), parameter :: max_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
@@ -62,7 +62,7 @@ contains
     call relaxation(grid, momentum, inverse, bound, bodies, flow%u, self)
     if (.not. self%converged) call conjugate_gradients(grid, momentum, inverse, bound, bodies, &
                                                        flow%u, self)
-    call force_of_links(bodies, flow, self)
+    call pull_of_links(self, flow%u, bodies%motion, self%force)
   end subroutine solve_viscous
 
   !> Successive overrelaxation: cells whose numbers have an even sum, those of an odd one, bodies.
@@ -378,34 +378,27 @@ contains
     real(wp), intent(in) :: x_body(:, :)
     real(wp), intent(out) :: y_body(:, :)
 
-    call halo_exchange(self%s, n_halo, layers=1)
-    call apply_to_cells(grid, self%diagonal, self%link, self%s, self%y)
-    call add_walls(self%walls, x_body, -1.0_wp, lbound(self%y), self%y)
-    y_body = rows_of_bodies(bodies, self, self%s, x_body)
-  end subroutine apply_viscous
-
-  !> y := the system without the links to bodies, applied to s.
-  subroutine apply_to_cells(grid, diagonal, link, s, y)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: diagonal, link, s
-    real(wp), intent(inout), contiguous :: y(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, c
 
-    !$omp parallel do collapse(2) private(i, j) schedule(static)
-    do c = 1, 3
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            y(i, j, k, c) = diagonal(i, j, k, c)*s(i, j, k, c) &
-              - link(i, j, k, 1)*s(i - 1, j, k, c) - link(i + 1, j, k, 1)*s(i + 1, j, k, c) &
-              - link(i, j, k, 2)*s(i, j - 1, k, c) - link(i, j + 1, k, 2)*s(i, j + 1, k, c) &
-              - link(i, j, k, 3)*s(i, j, k - 1, c) - link(i, j, k + 1, 3)*s(i, j, k + 1, c)
+    call halo_exchange(self%s, n_halo, layers=1)
+    associate (l => self%link, s => self%s)
+      !$omp parallel do collapse(2) private(i, j) schedule(static)
+      do c = 1, 3
+        do k = grid%lo(3), grid%hi(3)
+          do j = grid%lo(2), grid%hi(2)
+            do i = grid%lo(1), grid%hi(1)
+              self%y(i, j, k, c) = self%diagonal(i, j, k, c)*s(i, j, k, c) &
+                - l(i, j, k, 1)*s(i - 1, j, k, c) - l(i + 1, j, k, 1)*s(i + 1, j, k, c) &
+                - l(i, j, k, 2)*s(i, j - 1, k, c) - l(i, j + 1, k, 2)*s(i, j + 1, k, c) &
+                - l(i, j, k, 3)*s(i, j, k - 1, c) - l(i, j, k + 1, 3)*s(i, j, k + 1, c)
+            end do
           end do
         end do
       end do
-    end do
-  end subroutine apply_to_cells
+    end associate
+    call add_walls(self%walls, x_body, -1.0_wp, lbound(self%y), self%y)
+    y_body = rows_of_bodies(bodies, self, self%s, x_body)
+  end subroutine apply_viscous
 
   !> Add to the cells what the links to bodies do that move, times a factor.
   pure subroutine add_walls(walls, motion, factor, first, y)
@@ -447,15 +440,6 @@ contains
       y(:, b) = inertial_momentum(bodies, b, self%dt, motion(:, b)) - pull(:, b)
     end do
   end function rows_of_bodies
-
-  !> Viscous force and torque on each body, from its wall links [N, N m].
-  subroutine force_of_links(bodies, flow, self)
-    type(rigid_motion_t), intent(in) :: bodies
-    type(flow_t), intent(in) :: flow
-    type(viscous_t), intent(inout) :: self
-
-    call pull_of_links(self, flow%u, bodies%motion, self%force)
-  end subroutine force_of_links
 
   !> Force and torque on each body of its wall links, and of the stress that they leave out, for
   !! velocities of the cells and motions of the bodies [N, N m].

@@ -16,7 +16,8 @@ module pressure_system_m
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, force_from_cells, add_cell_flux
   use outflow_m, only: outflow_t, side_distance
   use mixture_m, only: face_mean
-  use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t, &
+                               seven_points
   use exact_sum_m, only: exact_dot
   use solve_control_m, only: solve_control_t, solve_report_t
   use krylov_m, only: take_all_cells, find_null_space, conjugate_gradient, bicgstab
@@ -184,7 +185,7 @@ contains
     real(wp), intent(inout), contiguous :: y(:, :, :)
 
     call halo_exchange(x, 1)
-    call seven_points(self%lo, self%hi, self%cf, x, y)
+    call seven_points(self%cf, x, y)
     if (.not. any(self%bodies%free)) return
     call force_from_cells(self%bodies, self%flux, x, self%lo - 1, self%push)
     if (self%pressed) self%push = self%push - self%wall_share*exact_dot(x, self%is_open, 1)
@@ -192,29 +193,6 @@ contains
     call add_cell_flux(self%bodies, self%flux, self%push, self%lo - 1, y)
     if (self%pressed) y = y - sum(self%wall_share*self%push)*self%is_open
   end subroutine apply_pressure
-
-  !> The part of the operator on the grid.
-  subroutine seven_points(lo, hi, cf, x, y)
-    integer, intent(in) :: lo(3), hi(3)
-    real(wp), intent(in), contiguous :: cf(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
-    real(wp), intent(in), contiguous :: x(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
-    real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
-    integer :: i, j, k
-
-    !$omp parallel do private(i, j) schedule(static)
-    do k = lo(3), hi(3)
-      do j = lo(2), hi(2)
-        do i = lo(1), hi(1)
-          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
-                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
-                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
-                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
-                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
-                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
-        end do
-      end do
-    end do
-  end subroutine seven_points
 
   !> Acceleration of the free bodies by given forces: a = M^{-1} F, in place.
   pure subroutine motion_of_force(bodies, a)

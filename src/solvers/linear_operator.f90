@@ -7,7 +7,7 @@ module linear_operator_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  public :: linear_operator_t, preconditioner_t, jacobi_t, identity_t, seven_points
 
   integer, parameter :: worth_threads = 8192   !! fewer numbers are the work of one thread
 
@@ -57,6 +57,32 @@ module linear_operator_m
   end type jacobi_t
 
 contains
+
+  !> y = sum over the faces of a cell of cf (x - x beyond the face).
+  subroutine seven_points(cf, x, y, line)
+    real(wp), intent(in), contiguous :: cf(:, :, :, :)   !! of the lower faces
+    real(wp), intent(in), contiguous :: x(:, :, :)
+    real(wp), intent(inout), contiguous :: y(:, :, :)
+    integer, intent(in), optional :: line(:, :, :)
+      !! (2, j, k) first and last cell of each line that take part; all if not given
+    integer :: i, j, k, ends(2)
+
+    !$omp parallel do private(i, j, ends) schedule(static) if (size(x) > worth_threads)
+    do k = 2, size(x, 3) - 1
+      do j = 2, size(x, 2) - 1
+        ends = [2, size(x, 1) - 1]
+        if (present(line)) ends = line(:, j, k)
+        do i = ends(1), ends(2)
+          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
+                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
+                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
+                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
+                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
+                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+        end do
+      end do
+    end do
+  end subroutine seven_points
 
   subroutine apply_identity(self, r, r_max, z)
     class(identity_t), intent(inout) :: self

@@ -7,7 +7,7 @@ module linear_systems_m
   use errors_m, only: to_text
   use case_text_m, only: grid_of, sides
   use grid_m, only: grid_t, unit_step
-  use linear_operator_m, only: linear_operator_t
+  use linear_operator_m, only: linear_operator_t, seven_points
   use krylov_m, only: krylov_work_t, krylov_init
   use multigrid_m, only: multigrid_t
   use parallel_m, only: halo_exchange
@@ -273,29 +273,7 @@ contains
     real(wp), intent(inout), contiguous :: x(:, :, :), y(:, :, :)
 
     call halo_exchange(x, 1)
-    call seven_points(self%lo, self%hi, self%cf, x, y)
+    call seven_points(self%cf, x, y)
   end subroutine apply_faces
-
-  subroutine seven_points(lo, hi, cf, x, y)
-    integer, intent(in) :: lo(3), hi(3)
-    real(wp), intent(in), contiguous :: cf(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
-    real(wp), intent(in), contiguous :: x(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
-    real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
-    integer :: i, j, k
-
-    !$omp parallel do private(i, j) schedule(static) if (size(x) > 8192)
-    do k = lo(3), hi(3)
-      do j = lo(2), hi(2)
-        do i = lo(1), hi(1)
-          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
-            + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
-            + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
-            + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
-            + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
-            + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
-        end do
-      end do
-    end do
-  end subroutine seven_points
 
 end module linear_systems_m

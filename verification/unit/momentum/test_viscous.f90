@@ -7,7 +7,7 @@ module test_viscous_m
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_links_m, only: build_viscous
   use merged_cells_m, only: merged_cells_t
-  use viscous_m, only: solve_viscous, force_of_links
+  use viscous_m, only: solve_viscous, pull_of_links
   use one_body_m, only: one_body_t, place, sides, slip, body
   implicit none
   private
@@ -171,7 +171,7 @@ contains
     tank%bodies%x(:, 1) = [0.3_wp, 0.6_wp, -0.2_wp]
     tank%bodies%motion(:, 1) = [0.3_wp, -0.2_wp, 0.5_wp, 0.7_wp, -0.4_wp, 0.6_wp]
     call build(5.0_wp)
-    call force_of_links(tank%bodies, tank%flow, viscous)
+    call pull_of_links(viscous, tank%flow%u, tank%bodies%motion, viscous%force)
     call check('the block of a body in the system holds it as its links do', viscous%force(:, 1), &
                -matmul(viscous%body_matrix(:, :, 1), tank%bodies%motion(:, 1)), 1.0e-13_wp)
     call check('they do', norm2(viscous%force(4:6, 1)) > 1.0e-3_wp)
