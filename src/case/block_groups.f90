@@ -130,7 +130,6 @@ contains
     integer :: n, most
 
     shape%line = v%group%line
-    if (.not. allocated(shape%file)) shape%file = ''
     call v%about('a kind of block: its form, size and density')
     call v%name('name', shape%name, 'what &body and &drop call the shape', &
       example='''hexapod''', required=.true.)
@@ -249,7 +248,6 @@ contains
     body%line = v%group%line
     call v%about('one block, there from the start or released later', &
       ways='shape position|shape motion')
-    if (.not. allocated(body%motion)) body%motion = ''
     call visit_shape_name(v, body%shape, shapes, required=.true.)
     call v%text('motion', body%motion, 'a table that moves a fixed block: a CSV file of columns ' &
       //'time, x, y, z and, if it turns, qw, qx, qy, qz; smooth between rows, held before the ' &
@@ -282,7 +280,6 @@ contains
     logical :: table   ! names a file
 
     drop%line = v%group%line
-    if (.not. allocated(drop%file)) drop%file = ''
     call v%about('blocks dropped one after another: at one place, along a line, or as a table ' &
       //'says', ways='shape position|shapes position|file')
     call v%text('file', drop%file, 'a table of places in CSV, in place of shape to interval and ' &

@@ -43,9 +43,7 @@ contains
     character(*), intent(in) :: name
     integer :: code
 
-    do code = ubound(kind_of, 1), 1, -1
-      if (kind_of(code)%name == name) return
-    end do
+    code = max(no_side, findloc(kind_of%name == name, .true., 1) - 1)   ! the first is 0
   end function side_code
 
   !> The names of all kinds, one blank between them.

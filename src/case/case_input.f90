@@ -24,12 +24,13 @@ module case_input_m
     parse_integer
   implicit none
   private
-  public :: read_case, parameters_text, group_names, is_repeated, list_entries
+  public :: read_case, parameters_text, group_names, first_repeated, list_entries
 
   !> The groups of the contract; those from `first_repeated` on may be repeated.
   character(name_length), parameter :: group_names(*) = [character(name_length) :: 'run', 'grid', &
     'boundary', 'fluid', 'numerics', 'contact', 'bed', 'start', 'water', 'shape', 'body', 'drop']
-  integer, parameter :: first_repeated = 9, g_water = 9, g_shape = 10, g_body = 11, g_drop = 12
+  integer, parameter :: first_repeated = 9
+  integer, parameter :: g_bed = 7, g_start = 8, g_water = 9, g_shape = 10, g_body = 11, g_drop = 12
 
 contains
 
@@ -61,7 +62,7 @@ contains
       if (g == 0) then
         call v%report(': unknown group, nearest known: &' &
                       //nearest_name(printable(list(i)%name), group_names))
-      else if (n(g) > 0 .and. .not. is_repeated(g)) then
+      else if (n(g) > 0 .and. g < first_repeated) then
         call v%report(': the group is given twice, first on line '//to_text(first_line(g)))
       else
         if (n(g) == 0) first_line(g) = list(i)%line
@@ -83,14 +84,6 @@ contains
     deallocate (case%shape, case%body, case%drop)   ! fluid alone
     allocate (case%shape(0), case%body(0), case%drop(0))
   end subroutine read_case
-
-  !> May a case hold several of group g?
-  pure function is_repeated(g) result(yes)
-    integer, intent(in) :: g
-    logical :: yes
-
-    yes = g >= first_repeated
-  end function is_repeated
 
   !> A family of stones becomes one shape for each; each body that names the family takes the next.
   subroutine name_members(case)
@@ -135,7 +128,6 @@ contains
   subroutine set_empty(case)
     type(case_t), intent(inout) :: case
 
-    case%run%title = ''
     case%run%output = 'mics-out'
     case%bed%file = ''
     case%start%file = ''
@@ -417,12 +409,17 @@ contains
     type(case_t) :: copy   ! reading a group in which nothing is given leaves it as it is
     type(group_visitor_t) :: v
     character(name_length) :: no_names(0)
+    integer :: n(size(group_names))   ! groups of each name; an unused bed is none
     integer :: g, i, k
 
     copy = case
+    n = 1
+    n(g_bed) = merge(1, 0, len_trim(case%bed%file) > 0)
+    n(g_start) = merge(1, 0, len_trim(case%start%file) > 0)
+    n(g_water:g_drop) = [size(case%water), size(case%shape), size(case%body), size(case%drop)]
     do g = 1, size(group_names)
-      do i = 1, number_of(copy, group_names(g))
-        if (group_names(g) == 'shape') then
+      do i = 1, n(g)
+        if (g == g_shape) then
           if (copy%shape(i)%member > 1) cycle   ! of a family already written
         end if
         call v%start_empty(group_names(g))
@@ -451,22 +448,5 @@ contains
     call v%start_empty(group)
     call visit_group(v, case, group, 1, no_names)
   end subroutine list_entries
-
-  !> How many groups of a name a case has; an unused bed is none.
-  pure function number_of(case, group) result(n)
-    type(case_t), intent(in) :: case
-    character(*), intent(in) :: group
-    integer :: n
-
-    select case (group)
-    case ('water'); n = size(case%water)
-    case ('shape'); n = size(case%shape)
-    case ('body'); n = size(case%body)
-    case ('drop'); n = size(case%drop)
-    case ('bed'); n = merge(1, 0, len_trim(case%bed%file) > 0)
-    case ('start'); n = merge(1, 0, len_trim(case%start%file) > 0)
-    case default; n = 1
-    end select
-  end function number_of
 
 end module case_input_m

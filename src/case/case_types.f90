@@ -158,7 +158,6 @@ module case_types_m
     character(name_length) :: shape = ''            !! required, or one of the next two
     character(name_length) :: shapes(max_drop_shapes) = ''   !! drawn by weight
     character(:), allocatable :: file               !! with a table of places
-    character(:), allocatable :: checksum           !! of the table
     type(place_t), allocatable :: row(:)            !! of the table
     real(wp) :: weights(max_drop_shapes) = [1.0_wp, spread(absent, 1, max_drop_shapes - 1)]
     real(wp) :: position(3) = absent                !! required [m]

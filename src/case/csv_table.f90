@@ -38,7 +38,7 @@ module csv_table_m
     integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, 0:rows), 0: the names
   contains
     procedure :: cell, column, number, place, report => table_report
-    procedure :: check_names, rename, warn_of_remarks
+    procedure :: check_names, warn_of_remarks
   end type csv_table_t
 
 contains
@@ -215,9 +215,7 @@ contains
     character(*), intent(in) :: name
     integer :: c
 
-    do c = size(self%name), 1, -1
-      if (self%name(c) == name) return
-    end do
+    c = findloc(self%name == name, .true., 1)
   end function column
 
   !> Where a cell stands, its column named as the file does; row 0: the name itself.
@@ -285,14 +283,6 @@ contains
       //to_text(self%n_doubtful)//' in all, the first on line '//to_text(self%doubtful) &
       //'; a text that begins with # stands in quotes', line)
   end subroutine warn_of_remarks
-
-  !> Call a column by the name that the program has for it, unless there is one of that name.
-  subroutine rename(self, from, to)
-    class(csv_table_t), intent(inout) :: self
-    character(*), intent(in) :: from, to
-
-    if (self%column(from) > 0 .and. self%column(to) == 0) self%name(self%column(from)) = to
-  end subroutine rename
 
   !> Columns that are not known, required ones that are missing, and units; numbers are converted
   !! to those of the program.

@@ -37,9 +37,9 @@ module group_visitor_m
     procedure :: start, start_empty, about, finish, judge
     procedure :: given, good, needed, require, without_meaning, report, pass_over
     procedure :: name, names, option, text => text_value, logical => logical_value
+    procedure :: integer => integer_value
     generic :: real => real_value, real_values
-    generic :: integer => integer_value, integer_values
-    procedure, private :: real_value, real_values, integer_value, integer_values
+    procedure, private :: real_value, real_values
     procedure, private :: enter, lookup, fault, read_number, read_text
   end type group_visitor_t
 
@@ -243,27 +243,12 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    integer :: values(1)
-
-    values = n
-    call self%integer_values(variable, values, allowed, meaning, example, required)
-    n = values(1)
-  end subroutine integer_value
-
-  !> As many whole numbers as `n` has elements.
-  subroutine integer_values(self, variable, n, allowed, meaning, example, required)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable
-    integer, intent(inout) :: n(:)
-    type(allowed_t), intent(in) :: allowed
-    character(*), intent(in) :: meaning, example
-    logical, intent(in), optional :: required
-    real(wp) :: values(size(n))
+    real(wp) :: values(1)
 
     values = n
     call self%real_values(variable, values, allowed, meaning, example, required)
-    n = nint(values)
-  end subroutine integer_values
+    n = nint(values(1))
+  end subroutine integer_value
 
   !> As many numbers as `x` has elements, or from `allowed%fewest` on; those not given stay.
   subroutine real_values(self, variable, x, allowed, meaning, example, required)
@@ -320,9 +305,10 @@ contains
     character(*), intent(in) :: meaning, example
     integer :: i
 
+    if (.not. allocated(text)) text = ''
     call self%enter(variable, 'text', meaning, example)
     i = self%lookup()
-    if (i > 0) call self%read_text(i, text)
+    if (i > 0) call self%read_text(i, 1, text)
     if (i > 0 .and. sanitise(text) /= text) then
       call self%fault(i, 'must hold no control characters')
     end if
@@ -363,7 +349,7 @@ contains
     if (i > 0) n = size(self%group%assignment(i)%value)
     do j = 1, n
       word = ''
-      call self%read_text(i, word, j)
+      call self%read_text(i, j, word)
       if (len(word) == 0 .or. len(word) > name_length .or. verify(word, allowed) > 0 &
           .or. scan(word//'.', '.') == 1) call self%fault(i, 'a name has 1 to ' &
         //to_text(name_length)//' letters, digits or _ - . and does not begin with a point')
@@ -389,7 +375,7 @@ contains
     i = self%lookup()
     if (i > 0) then
       text = ''
-      call self%read_text(i, text)
+      call self%read_text(i, 1, text)
       if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. index(text, ' ') > 0 &
           .or. len(text) == 0) call self%fault(i, 'unknown, must be one of ' &
         //choices(words_of(allowed)))
@@ -499,17 +485,13 @@ contains
     if (info /= value_ok) call self%fault(i, must//what)
   end subroutine read_number
 
-  !> A value of assignment i, the first by default, which must be a quoted text.
-  subroutine read_text(self, i, text, j)
+  !> Value j of assignment i, which must be a quoted text.
+  subroutine read_text(self, i, j, text)
     class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i
+    integer, intent(in) :: i, j
     character(:), allocatable, intent(inout) :: text   !! stays where the value is none
-    integer, intent(in), optional :: j
-    integer :: at
 
-    at = 1
-    if (present(j)) at = j
-    associate (value => self%group%assignment(i)%value(at))
+    associate (value => self%group%assignment(i)%value(j))
       if (value%quoted) then
         text = value%text
       else

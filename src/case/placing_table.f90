@@ -67,14 +67,15 @@ contains
     type(problems_t), intent(inout) :: problems, warnings
     type(csv_table_t) :: table
     character(120), allocatable :: pose(:)
-    integer :: column(size(known)), r, k
+    integer :: column(size(known)), r, k, c
 
     call read_table(found_file(drop%file), table, problems)
     drop%count = table%n_rows
     allocate (drop%row(table%n_rows))
     if (size(table%name) == 0) return
-    do k = 1, size(client, 2)
-      call table%rename(trim(client(1, k)), client(2, k))
+    do k = 1, size(client, 2)   ! unless there is one of the program's name
+      c = table%column(client(1, k))
+      if (c > 0 .and. table%column(client(2, k)) == 0) table%name(c) = client(2, k)
     end do
     call table%check_names(known, units, n_required, problems)
     column = [(table%column(known(k)), k=1, size(known))]
@@ -206,6 +207,8 @@ contains
     integer, intent(in) :: r, column(:)
     real(wp), intent(inout) :: q(4)
     type(problems_t), intent(inout) :: problems
+    real(wp), parameter :: axis(3, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+      1.0_wp, 0.0_wp, 0.0_wp], [3, 3])   ! of yaw, pitch, roll
     real(wp) :: part(4), angle(3), heading
     logical :: ok
     integer :: k
@@ -233,25 +236,12 @@ contains
         call table%number(r, column(c_heading), .false., heading, ok, problems)
         angle(1) = 90.0_wp - heading
       end if
-      q = attitude_of_angles(angle(1), angle(2), angle(3))
+      angle = modulo(angle, 720.0_wp)*pi/180.0_wp
+      q = quaternion_from_axis(axis(:, 3), angle(3))   ! roll about x, then pitch, then yaw
+      do k = 2, 1, -1
+        q = quaternion_product(quaternion_from_axis(axis(:, k), angle(k)), q)
+      end do
     end if
   end subroutine read_attitude
-
-  !> Attitude of a block turned by roll about x, then pitch about y, then yaw about z.
-  pure function attitude_of_angles(yaw_deg, pitch_deg, roll_deg) result(q)
-    real(wp), intent(in) :: yaw_deg, pitch_deg, roll_deg   !! [degrees]
-    real(wp) :: q(4)
-
-    q = quaternion_product(turn([0.0_wp, 0.0_wp, 1.0_wp], yaw_deg), &
-      quaternion_product(turn([0.0_wp, 1.0_wp, 0.0_wp], pitch_deg), &
-      turn([1.0_wp, 0.0_wp, 0.0_wp], roll_deg)))
-  contains
-    pure function turn(axis, angle_deg) result(t)
-      real(wp), intent(in) :: axis(3), angle_deg
-      real(wp) :: t(4)
-
-      t = quaternion_from_axis(axis, modulo(angle_deg, 720.0_wp)*pi/180.0_wp)
-    end function turn
-  end function attitude_of_angles
 
 end module placing_table_m

@@ -9,7 +9,7 @@ module reference_m
   use allowed_values_m, only: entry_t, choices, words_of
   use group_visitor_m, only: group_visitor_t
   use string_builder_m, only: string_builder_t
-  use case_input_m, only: group_names, is_repeated, list_entries
+  use case_input_m, only: group_names, first_repeated, list_entries
   use errors_m, only: problems_t, to_text
   use value_text_m, only: lower_case, nearest_name, printable
   implicit none
@@ -38,7 +38,7 @@ contains
       do g = 1, size(group_names)
         call list_entries(group_names(g), v)
         name = group_names(g)(:12)
-        if (is_repeated(g)) name = trim(name)//' *'
+        if (g >= first_repeated) name = trim(name)//' *'
         text = text//'  '//name//v%meaning//line_end
       end do
     case ('json'); text = schema_text()
@@ -63,7 +63,7 @@ contains
 
     call list_entries(group_names(g), v)
     call lines%add_line('&'//v%group%name//': '//v%meaning)
-    if (is_repeated(g)) call lines%add_line('A case may hold any number of these groups.')
+    if (g >= first_repeated) call lines%add_line('A case may hold any number of these groups.')
     indent = maxval(len_trim(v%entry(:v%n)%name)) + 4
     do i = 1, v%n
       associate (entry => v%entry(i))
@@ -136,7 +136,7 @@ contains
       call list_entries(name, v)
       groups = groups//','//line_end//'  "'//name//'": '//group_schema(v)
       place = '{"$ref": "#/$defs/'//name//'"}'
-      if (is_repeated(g)) then
+      if (g >= first_repeated) then
         place = '{"anyOf": ['//place//', {"type": "array", "items": '//place//'}]}'
       else if (any(v%entry(:v%n)%required)) then
         needed = needed//' '//name

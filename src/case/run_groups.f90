@@ -78,10 +78,13 @@ contains
   subroutine visit_grid(v, grid)
     type(group_visitor_t), intent(inout) :: v
     type(grid_input_t), intent(inout) :: grid
+    real(wp) :: cells(3)
 
     call v%about('the tank and the cells it is cut into')
-    call v%integer('cells', grid%cells, allowed_t(whole=.true., low=1.0_wp), &
+    cells = grid%cells
+    call v%real('cells', cells, allowed_t(whole=.true., low=1.0_wp), &
       'how many cells in x, y, z', example='60, 20, 40', required=.true.)
+    grid%cells = nint(cells)
     call v%real('length', grid%length, between(shortest, 1.0_wp/shortest, 'm'), &
       'the length of the tank in x, y, z', example='0.3, 0.1, 0.2', required=.true.)
     call v%real('origin', grid%origin, any_number('m'), &

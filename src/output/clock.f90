@@ -27,9 +27,8 @@ module clock_m
     integer :: step = 0
     type(schedule_t) :: rows, frames, restarts
     real(wp) :: rest_began = -1.0_wp   !! when all blocks came to rest [s]; < 0: they move
-    real(wp) :: t_end = 0.0_wp      !! [s]
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
-    type(run_t) :: run              !! intervals and the rule for settling
+    type(run_t) :: run              !! intervals, end, the rule for settling
   contains
     procedure :: choose_step, advance, finished, settled
   end type clock_t
@@ -42,7 +41,6 @@ contains
     type(clock_t), intent(out) :: clock
 
     clock%run = run
-    clock%t_end = run%t_end
     clock%rows%interval = run%history_interval
     clock%frames%interval = run%field_interval
     clock%frames%next = merge(0.0_wp, huge(clock%t), run%field_interval > 0.0_wp)
@@ -100,7 +98,7 @@ contains
     real(wp), intent(in) :: next_release   !! time of the next one after t; huge if none [s]
     real(wp) :: landing, way
 
-    landing = self%t_end
+    landing = self%run%t_end
     if (next_release > self%t + same_time) landing = min(landing, next_release)
     way = landing - self%t
     if (way <= dt_allowed*(1.0_wp + 1.0e-9_wp) .or. way <= same_time) then
@@ -126,7 +124,7 @@ contains
     class(clock_t), intent(in) :: self
     logical :: yes
 
-    yes = self%t >= self%t_end - same_time .or. self%settled()
+    yes = self%t >= self%run%t_end - same_time .or. self%settled()
   end function finished
 
   !> Have all blocks been at rest for `rest_time`, with none to come, in a run that ends then?

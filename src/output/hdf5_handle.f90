@@ -66,10 +66,8 @@ module hdf5_handle_m
     procedure :: reserve, check, fail
     procedure :: group, has, remove
     procedure, private :: attribute_text, attribute_integers, attribute_reals
-    procedure, private :: read_text_attribute, read_integer_attribute
     generic :: attribute => attribute_text, attribute_integers, attribute_reals
-    generic :: read_attribute => read_text_attribute, read_integer_attribute
-    procedure :: last_integer
+    procedure :: last_integer, read_attribute
   end type h5_handle_t
 
   !> What HDF5 notes about one level of a failed call.
@@ -129,21 +127,10 @@ contains
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: path
     logical, intent(in) :: shared   !! all processes call
-    integer(hid_t) :: access
-    integer :: status
 
     self%info = 0
     self%message = ''
-    if (is_root() .or. .not. shared) then
-      call begin_file(self, path, .false., access)
-      self%writing = .true.
-      if (self%info == 0) then
-        call h5fcreate_f(path, H5F_ACC_EXCL_F, self%id, status, access_prp=access)
-        call self%check(status, 'create the file')
-        call h5pclose_f(access, status)
-        call hold_file(self)
-      end if
-    end if
+    if (is_root() .or. .not. shared) call begin_file(self, path, .false., .true., new=.true.)
     if (.not. shared .or. nproc() == 1) return
     if (is_root()) call self%close()
     call broadcast(self%info)
@@ -158,35 +145,25 @@ contains
     character(*), intent(in) :: path
     logical, intent(in) :: shared    !! all processes call, to write
     logical, intent(in) :: writing
-    integer(hid_t) :: access
-    integer :: status
 
-    call begin_file(self, path, shared .and. nproc() > 1, access)
-    self%writing = writing
-    self%complete = .true.
-    if (self%info /= 0) return
-    if (is_pipe(path)) call self%fail('cannot open the file: it is a pipe')
-    if (self%info /= 0) return
-    call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)
-    call self%check(status, 'open the file')
-    call h5pclose_f(access, status)
-    if (writing) call hold_file(self)
+    call begin_file(self, path, shared .and. nproc() > 1, writing, new=.false.)
   end subroutine file_open
 
-  !> Start HDF5 and make the lists that say how the file is accessed.
-  subroutine begin_file(self, path, shared, access)
+  !> Start HDF5, make the lists that say how the file is accessed, and open or create it.
+  subroutine begin_file(self, path, shared, writing, new)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: path
-    logical, intent(in) :: shared
-    integer(hid_t), intent(out) :: access
+    logical, intent(in) :: shared, writing, new
+    integer(hid_t) :: access
     integer :: status(6)
 
     self%path = path
     self%shared = shared
+    self%writing = writing
     self%info = 0
     self%message = ''
     self%broken = .false.
-    self%complete = .false.
+    self%complete = .not. new
     self%id = -1
     access = -1
     status = 0
@@ -200,6 +177,19 @@ contains
     if (shared) call set_file_access(access, status(5))
     if (shared) call set_collective(self%transfer, status(6))
     call self%check(minval(status), 'set the access')
+    if (self%info /= 0) return
+    if (new) then
+      call h5fcreate_f(path, H5F_ACC_EXCL_F, self%id, status(1), access_prp=access)
+      call self%check(status(1), 'create the file')
+    else if (is_pipe(path)) then
+      call self%fail('cannot open the file: it is a pipe')
+    else
+      call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status(1), &
+        access)
+      call self%check(status(1), 'open the file')
+    end if
+    call h5pclose_f(access, status(1))
+    if (writing) call hold_file(self)
   end subroutine begin_file
 
   !> Hold the file by the number under which HDF5 has it. MPI tells none: then the root process
@@ -431,51 +421,38 @@ contains
     if (before /= 0) self%info = before
   end subroutine last_integer
 
-  !> A text attribute that `attribute` wrote.
-  subroutine read_text_attribute(self, object, name, value)
+  !> Read an attribute that `attribute` wrote, a text or a single integer.
+  subroutine read_attribute(self, object, name, text, number)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: object, name
-    character(:), allocatable, intent(out) :: value
+    character(:), allocatable, intent(out), optional :: text
+    integer, intent(out), optional :: number
     type(c_ptr), target :: start
-
-    call get_attribute(self, object, name, c_loc(start))
-    value = ''
-    if (self%info == 0) value = text_at(start)
-  end subroutine read_text_attribute
-
-  subroutine read_integer_attribute(self, object, name, value)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: object, name
-    integer, intent(out) :: value
     integer(i8), target :: wide
-
-    wide = 0
-    call get_attribute(self, object, name, c_loc(wide), h5kind_to_type(i8, H5_INTEGER_KIND))
-    value = int(wide)
-  end subroutine read_integer_attribute
-
-  subroutine get_attribute(self, object, name, data, type)
-    class(h5_handle_t), intent(inout) :: self
-    character(*), intent(in) :: object, name
-    type(c_ptr), value :: data
-    integer(hid_t), intent(in), optional :: type   !! in memory, else that in the file
-    integer(hid_t) :: id, type_there
+    type(c_ptr) :: data
+    integer(hid_t) :: id, there, here   ! types of the attribute, in memory
     integer :: status
 
+    if (present(text)) text = ''
+    if (present(number)) number = 0
     if (self%info /= 0) return
     call h5aopen_by_name_f(self%id, object, name, id, status)
     call self%check(status, 'read '//object//'@'//name)
     if (self%info /= 0) return
-    call h5aget_type_f(id, type_there, status)
-    if (present(type)) then
-      call h5aread_f(id, type, data, status)
-    else
-      call h5aread_f(id, type_there, data, status)
+    call h5aget_type_f(id, there, status)
+    here = there
+    data = c_loc(start)
+    if (present(number)) then
+      here = h5kind_to_type(i8, H5_INTEGER_KIND)
+      data = c_loc(wide)
     end if
+    call h5aread_f(id, here, data, status)
     call self%check(status, 'read '//object//'@'//name)
-    call h5tclose_f(type_there, status)
+    if (self%info == 0 .and. present(text)) text = text_at(start)
+    if (self%info == 0 .and. present(number)) number = int(wide)
+    call h5tclose_f(there, status)
     call h5aclose_f(id, status)
-  end subroutine get_attribute
+  end subroutine read_attribute
 
   !> Start HDF5: without file locks, so that a run can be read while it goes on, unless the user has
   !! set `HDF5_USE_FILE_LOCKING`; without its own messages; without a routine at exit, because we

@@ -107,8 +107,8 @@ contains
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') of('liquid_volume_drift')
     ! wall time to the end at the mean speed so far, as h:mm:ss
     seconds = 3.6e6_wp
-    if (clock%t > self%first_time) seconds = (wall_clock() - self%began)*(clock%t_end - clock%t) &
-      /(clock%t - self%first_time)
+    if (clock%t > self%first_time) seconds = (wall_clock() - self%began) &
+      *(clock%run%t_end - clock%t)/(clock%t - self%first_time)
     left = '          -'
     s = nint(min(seconds, 3.6e6_wp))
     if (seconds < 3.6e6_wp) write (left, '(i5, 2(":", i2.2))') s/3600, modulo(s/60, 60), &

@@ -40,6 +40,7 @@ module restart_m
   character(*), parameter :: format_name = 'mics-restart'
   integer, parameter :: format_version = 1
   integer, parameter :: max_displacements = 100000000
+  character(*), parameter :: no_line = 'nothing'   !! after the last of a text
 
 contains
 
@@ -182,7 +183,7 @@ contains
       end do
     end if
     if (info /= 0) return
-    if (state%clock%t_end < state%clock%t) then
+    if (state%clock%run%t_end < state%clock%t) then
       info = 2
       message = '&run t_end: the restart file is already past it'
       return
@@ -257,7 +258,7 @@ contains
 
     info = 1
     call file%read_attribute('/', 'format', kind)
-    call file%read_attribute('/', 'format_version', number)
+    call file%read_attribute('/', 'format_version', number=number)
     call file%read_attribute('/', 'parameters', before)
     if (file%info /= 0) then
       message = file%message
@@ -286,35 +287,26 @@ contains
       call next_line(after, at_new, new)
       if (old /= new) then
         if (len(message) > 0) message = message//'; '
-        if (starts_group(old) .or. starts_group(new)) group = ''
-        message = message//group//shown(new)//', was '//shown(old)
+        if (is_frame(old) .or. is_frame(new)) group = ''
+        message = message//group//new//', was '//old
         if (len(group) == 0) exit
-      else if (len(old) == 0) then
+      else if (old == no_line) then
         exit
-      else if (starts_group(old)) then
-        group = shown(old)//' '
+      else if (is_frame(old)) then
+        group = old//' '
       end if
     end do
     if (len(message) > 0) message = 'the case differs from that of the restart file: '//message
   end function changes
 
   !> Does a line begin or end a group, or are there no more?
-  pure function starts_group(line) result(yes)
+  pure logical function is_frame(line)
     character(*), intent(in) :: line
-    logical :: yes
 
-    yes = len(line) == 0 .or. index(adjustl(line), '&') == 1 .or. adjustl(line) == '/'
-  end function starts_group
+    is_frame = line == no_line .or. scan(line(1:1), '&/') == 1
+  end function is_frame
 
-  pure function shown(line) result(text)
-    character(*), intent(in) :: line
-    character(:), allocatable :: text
-
-    text = trim(adjustl(line))
-    if (len(text) == 0) text = 'nothing'
-  end function shown
-
-  !> The next line that must not change; empty at the end.
+  !> The next line that must not change; `no_line` at the end.
   subroutine next_line(text, at, line)
     character(*), intent(in) :: text
     integer, intent(inout) :: at   !! where to go on
@@ -323,15 +315,14 @@ contains
       'history_interval', 'restart_interval']
     integer :: n
 
-    line = ''
     do while (at <= len(text))
       n = index(text(at:)//new_line('a'), new_line('a')) - 1
-      line = text(at:at + n - 1)
+      line = trim(adjustl(text(at:at + n - 1)))
       at = at + n + 1
-      if (len_trim(line) == 0) cycle
-      if (.not. any(free == adjustl(line(:max(0, index(line, '=') - 1))))) return
-      line = ''
+      if (len(line) == 0) cycle
+      if (.not. any(free == line(:max(0, index(line, '=') - 1)))) return
     end do
+    line = no_line
   end subroutine next_line
 
   !> Read an item of the state. Faces on the upper side of a periodic domain are those on its lower

@@ -11,7 +11,7 @@ module write_run_m
   use bed_m, only: bed_t
   use errors_m, only: exit_files
   use state_m, only: run_state_t
-  use hdf5_file_m, only: h5_file_t, as_integer
+  use hdf5_file_m, only: h5_file_t, as_double, as_integer
   use table_m, only: result_file_t, appending
   use file_space_m, only: bytes_for_change
   use diagnostics_m, only: quantity_t
@@ -20,8 +20,9 @@ module write_run_m
   public :: run_file_t, create_run_file, reopen_run_file, continue_run_file, close_run_file
 
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
-    'exit_time', 'raised', 'impact_speed', 'rest_since']   !! datasets with a number per block
-  character(*), parameter :: once_units(*) = [character(3) :: 's', 's', 's', 'm', 'm/s', 's']
+    'exit_time', 'raised', 'impact_speed', 'rest_since', 'status']   !! datasets, a number per block
+  character(*), parameter :: once_units(*) = [character(3) :: 's', 's', 's', 'm', 'm/s', 's', '1']
+  integer, parameter :: once_kind(*) = [spread(as_double, 1, 6), as_integer]
   integer, parameter :: running = -1         !! exit status until the run ends, or if it was killed
 
   type, extends(result_file_t) :: run_file_t
@@ -30,7 +31,6 @@ module write_run_m
     real(wp) :: wall_time = 0.0_wp                     !! of the last row when a run goes on [s]
     real(wp), allocatable, private :: q(:, :)          !! as in the last row
     real(wp), allocatable, private :: once(:, :)       !! (blocks, `once_name`) as in the file
-    integer, allocatable, private :: status(:)         !! of the blocks, as in the file
   contains
     procedure :: write_head
     procedure :: list_columns
@@ -173,17 +173,15 @@ contains
     integer :: c
 
     values = reshape([blocks%release_time, blocks%entry_time, blocks%exit_time, blocks%raised, &
-      blocks%record%impact_speed, blocks%record%rest_since], shape(values))   ! by `once_name`
+      blocks%record%impact_speed, blocks%record%rest_since, real(blocks%status, wp)], &
+      shape(values))   ! by `once_name`
     if (every) self%once = values
-    if (every) self%status = blocks%status
     do c = 1, size(once_name)
       if (.not. (every .or. any(abs(values(:, c) - self%once(:, c)) > 0.0_wp))) cycle
       self%once(:, c) = values(:, c)
-      call self%file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), values(:, c))
+      call self%file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), values(:, c), &
+        kind=once_kind(c))
     end do
-    if (all(blocks%status == self%status) .and. .not. every) return
-    self%status = blocks%status
-    call self%file%store('/bodies/status', '1', real(self%status, wp), kind=as_integer)
   end subroutine store_once
 
   !> Open the file of a run that goes on; nothing in it is changed yet.

@@ -184,7 +184,7 @@ contains
     call heading('Shapes')
     touching = ['spheres   ', 'sphere [m]']
     if (case%contact%model == 'surface') touching = ['points    ', 'edge [m]  ']
-    write (output_unit, form) left('name', 14), left('kind', 9), 'tets', trim(touching(1)), &
+    write (output_unit, form) 'name          ', 'kind     ', 'tets', trim(touching(1)), &
       trim(touching(2)), 'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     g = norm(case%fluid%gravity)
     do s = 1, size(shapes)
@@ -195,7 +195,7 @@ contains
         *shapes(s)%volume)*g)
       smallest = 2*minval(shapes(s)%sphere_radius)
       if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
-      write (output_unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
+      write (output_unit, form) shapes(s)%name(:14), shapes(s)%kind(:9), &
         to_text(size(shapes(s)%tet, 2)), to_text(n_points(s)), brief(smallest), &
         brief(shapes(s)%volume), brief(mass), brief(mass*g), submerged
     end do
@@ -486,18 +486,11 @@ contains
   !> One line: a name and what is to be said about it.
   subroutine entry(name, text)
     character(*), intent(in) :: name, text
+    character(label_width) :: label
 
-    write (output_unit, '(2x, a, a)') left(name, label_width), trim(text)
+    label = name
+    write (output_unit, '(2x, a, a)') label, trim(text)
   end subroutine entry
-
-  !> Text with blanks behind it, cut or filled to a width.
-  pure function left(text, width) result(filled)
-    character(*), intent(in) :: text
-    integer, intent(in) :: width
-    character(width) :: filled
-
-    filled = text
-  end function left
 
   !> Three numbers.
   pure function triple(x, between) result(text)

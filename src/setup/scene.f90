@@ -105,13 +105,9 @@ contains
         s = shape_of_place(place, shapes)
         if (s == 0 .or. .not. is_given(place%x(3))) cycle
         n = n + 1
-        all_bodies(n)%shape = shapes(s)%name
-        all_bodies(n)%position = place%x
-        all_bodies(n)%quaternion = place%q
-        all_bodies(n)%velocity = place%v
-        all_bodies(n)%fixed = .true.
-        all_bodies(n)%release_time = place%time
-        all_bodies(n)%line = case%drop(i)%line
+        all_bodies(n) = body_input_t(line=case%drop(i)%line, shape=shapes(s)%name, &
+          position=place%x, quaternion=place%q, velocity=place%v, fixed=.true., &
+          release_time=place%time)
         scene%origin(:, n) = [i, k]
       end do
     end do

@@ -266,14 +266,9 @@ contains
     do k = 1, left%n
       if (.not. along(k)) cycle
       n = n + 1
-      body(n)%shape = left%shape(k)
-      body(n)%name = left%name(k)
-      body(n)%position = left%x(:, k) + case%start%shift
-      body(n)%quaternion = left%q(:, k)
-      body(n)%velocity = left%v(:, k)
-      body(n)%angular_velocity = left%omega(:, k)
-      body(n)%line = case%start%line
-      body(n)%motion = ''
+      body(n) = body_input_t(line=case%start%line, shape=left%shape(k), name=left%name(k), &
+        position=left%x(:, k) + case%start%shift, quaternion=left%q(:, k), &
+        velocity=left%v(:, k), angular_velocity=left%omega(:, k), motion='')
     end do
     call move_alloc(body, case%body)
   end subroutine bring_along

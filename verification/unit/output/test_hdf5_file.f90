@@ -14,25 +14,12 @@ module test_hdf5_file_m
   character(*), parameter :: path = 'test_hdf5_file.h5'
   integer, parameter :: layers = 12   !! of a dataset that all processes share
 
-  !> A table that has all kinds of columns.
-  type, extends(result_file_t) :: mixed_t
+  type, extends(result_file_t) :: sample_t
+    character(6) :: what = 'all'   !! kinds of columns; 'noise' and much in a row; 'shared' field
+    real(sp) :: sign = -1.0_sp     !! of that field
   contains
-    procedure :: write_head
-    procedure :: list_columns => list_mixed
-  end type mixed_t
-
-  !> One with a field of noise and a column of much in a row.
-  type, extends(mixed_t) :: noisy_t
-  contains
-    procedure :: list_columns => list_noise
-  end type noisy_t
-
-  !> One of a field that all processes share, first with the other sign.
-  type, extends(mixed_t) :: shared_t
-    real(sp) :: sign = -1.0_sp
-  contains
-    procedure :: list_columns => list_shared
-  end type shared_t
+    procedure :: write_head, list_columns
+  end type sample_t
 
 contains
 
@@ -79,33 +66,47 @@ contains
   end subroutine meet
 
   subroutine write_head(self, state)
-    class(mixed_t), intent(inout) :: self
+    class(sample_t), intent(inout) :: self
     type(run_state_t), intent(in) :: state
 
     call self%file%attribute('/', 'step', [state%clock%step])
   end subroutine write_head
 
-  subroutine list_mixed(self, state)
-    class(mixed_t), intent(inout) :: self
+  subroutine list_columns(self, state)
+    class(sample_t), intent(inout) :: self
     type(run_state_t), intent(in) :: state
     real(wp) :: place(3, 2)
-    real(sp) :: field(24)
+    real(sp) :: a(96)
+    integer :: first, last, i
 
     associate (t => state%clock%t)
       place = t + reshape([0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], [3, 2])
-      field = real(t, sp)
       call self%column('/time', 's', t)
-      call self%column('/place', 'm', [place], 3)
-      call self%column('/touched', '1', [t, -t], kind=as_integer)
-      call self%column('/nobody', 'm', [real(wp) ::], 3)
-      call self%points('/points', 'm', .true., place)
-      call self%cells('/cells', '1', [t, t + 1, t + 2])
-      call self%field('/field', 'Pa', [2, 3, 4], [1, 1, 1], [2, 3, 4], field)
+      select case (self%what)
+      case ('all')
+        a = real(t, sp)
+        call self%column('/place', 'm', [place], 3)
+        call self%column('/touched', '1', [t, -t], kind=as_integer)
+        call self%column('/nobody', 'm', [real(wp) ::], 3)
+        call self%points('/points', 'm', .true., place)
+        call self%cells('/cells', '1', [t, t + 1, t + 2])
+        call self%field('/field', 'Pa', [2, 3, 4], [1, 1, 1], [2, 3, 4], a(:24))
+      case ('noise')
+        a = [(real(mod(sin(t*size(a) + i)*43758.5453_wp, 1.0_wp), sp), i=1, size(a))]
+        call self%field('/field', 'm', [3, size(a)/3], [1, 1], [3, size(a)/3], a)
+        call self%column('/place', 'm', spread(1.0_wp, 1, 1200), 3)
+      case default
+        a = self%sign*[(sqrt(real(i, sp)), i=1, size(a))]
+        first = 1
+        last = layers
+        if (self%file%shared) call own_layers(first, last)
+        call self%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
+      end select
     end associate
-  end subroutine list_mixed
+  end subroutine list_columns
 
   subroutine test_columns()
-    type(mixed_t) :: table
+    type(sample_t) :: table
     type(run_state_t) :: state
     real(wp) :: x(6), points(3*2*11)
     integer, allocatable :: found(:)
@@ -153,27 +154,14 @@ contains
     last = (layers*(my_rank() + 1))/nproc()
   end subroutine own_layers
 
-  subroutine list_shared(self, state)
-    class(shared_t), intent(inout) :: self
-    type(run_state_t), intent(in) :: state
-    real(sp) :: a(layers)
-    integer :: first, last, i
-
-    a = self%sign*[(sqrt(real(i, sp)), i=1, layers)]
-    first = 1
-    last = layers
-    if (self%file%shared) call own_layers(first, last)
-    call self%column('/time', 's', state%clock%t)
-    call self%field('/field', 'm', [layers], [first], [last - first + 1], a(first:last))
-  end subroutine list_shared
-
   !> All processes together go on in a file that one process began.
   subroutine test_go_on_together()
-    type(shared_t) :: table
+    type(sample_t) :: table
     type(run_state_t) :: state
     real(wp) :: x(layers)
     integer :: i
 
+    table%what = 'shared'
     if (is_root()) then
       call remove(path)
       call table%create(path, .false., state)
@@ -195,21 +183,9 @@ contains
     call table%file%close()
   end subroutine test_go_on_together
 
-  subroutine list_noise(self, state)
-    class(noisy_t), intent(inout) :: self
-    type(run_state_t), intent(in) :: state
-    integer, parameter :: n = 96
-    integer :: i
-
-    call self%column('/time', 's', state%clock%t)
-    call self%field('/field', 'm', [3, n/3], [1, 1], [3, n/3], [(real(mod(sin(state%clock%t*n + i) &
-      *43758.5453_wp, 1.0_wp), sp), i=1, n)])
-    call self%column('/place', 'm', spread(1.0_wp, 1, 1200), 3)
-  end subroutine list_noise
-
   !> No row takes more than it has asked for, compressed or not, however large the index grows.
   subroutine test_room()
-    type(noisy_t) :: table
+    type(sample_t) :: table
     type(run_state_t) :: state
     integer, parameter :: rows = 2500
     integer(i8) :: before, after, capacity
@@ -217,6 +193,7 @@ contains
     logical :: grew
 
     if (.not. is_root()) return
+    table%what = 'noise'
     call remove(path)
     call table%create(path, .false., state)
     too_large = 0
