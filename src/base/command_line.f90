@@ -117,7 +117,8 @@ contains
     logical, intent(in) :: has_value
     type(options_t), intent(inout) :: options
     type(problems_t), intent(inout) :: problems
-    integer :: n, info
+    integer, parameter :: most(3) = [100000, 59, 59]
+    integer :: n, info, part(3), i, first, colon
 
     if (all(known /= word)) then
       call problems%add_message("unknown option '"//word//"'; the nearest is " &
@@ -150,35 +151,25 @@ contains
       else
         options%threads = n
       end if
-    case ('--max-wall'); call take_max_wall(value, options, problems)
+    case ('--max-wall')   ! hours and minutes, perhaps seconds: 12:00, 0:30, 1:30:00
+      part = 0
+      first = 1
+      info = value_ok
+      do i = 1, 3
+        if (first > len(value) + 1 .or. info /= value_ok) exit
+        colon = index(value(first:)//':', ':') + first - 1
+        call parse_integer(value(first:colon - 1), part(i), info)
+        first = colon + 1
+      end do
+      if (info /= value_ok .or. index(value, ':') == 0 .or. first <= len(value) + 1 &
+          .or. any(part < 0 .or. part > most) .or. all(part == 0)) then
+        call problems%add('--max-wall', value, 'must be a time HH:MM or HH:MM:SS above 0:00')
+      else
+        options%max_wall = 3600.0_wp*part(1) + 60.0_wp*part(2) + part(3)
+      end if
     case default; error stop 'take_option: an option is known but not handled'
     end select
   end subroutine take_option
-
-  !> Hours and minutes, perhaps seconds: 12:00, 0:30, 1:30:00.
-  subroutine take_max_wall(value, options, problems)
-    character(*), intent(in) :: value
-    type(options_t), intent(inout) :: options
-    type(problems_t), intent(inout) :: problems
-    integer, parameter :: most(3) = [100000, 59, 59]
-    integer :: part(3), i, first, colon, info
-
-    part = 0
-    first = 1
-    info = value_ok
-    do i = 1, 3
-      if (first > len(value) + 1 .or. info /= value_ok) exit
-      colon = index(value(first:)//':', ':') + first - 1
-      call parse_integer(value(first:colon - 1), part(i), info)
-      first = colon + 1
-    end do
-    if (info /= value_ok .or. index(value, ':') == 0 .or. first <= len(value) + 1 &
-        .or. any(part < 0 .or. part > most) .or. all(part == 0)) then
-      call problems%add('--max-wall', value, 'must be a time HH:MM or HH:MM:SS above 0:00')
-    else
-      options%max_wall = 3600.0_wp*part(1) + 60.0_wp*part(2) + part(3)
-    end if
-  end subroutine take_max_wall
 
   !> The command line that goes on from a restart file, as a shell reads it.
   !!

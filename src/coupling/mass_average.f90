@@ -20,7 +20,7 @@ module mass_average_m
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
-  use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
+  use momentum_c_ismac_m, only: advected_velocity
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, both_solves, divergence
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
@@ -139,6 +139,7 @@ contains
     class(mass_average_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
+    integer :: d
 
     call take(s%scratch, by_stress)
     associate (grid => s%grid, flow => s%flow, a => self%acceleration)
@@ -148,7 +149,11 @@ contains
       call add_tension(grid, self%rho, self%tension, a%face)
       call give(s%scratch, self%tension%force)
       call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
-      if (self%implicit_momentum) call flux_of_faces(grid, s%dt, flow%uf, self%c_ismac%q)
+      if (self%implicit_momentum) then   ! the mixture passes whole faces
+        do d = 1, 3
+          self%c_ismac%q(:, :, :, d) = s%dt*grid%area(d)*flow%uf(:, :, :, d)
+        end do
+      end if
       call surface_stress(grid, s%solid%alpha, self%rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(s, self)
       call add_product(grid, s%dt, by_stress, flow%u)

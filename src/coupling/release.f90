@@ -47,6 +47,7 @@ contains
     logical, intent(out) :: released         !! there was one
     integer, allocatable :: due(:)
     logical, allocatable :: free(:)
+    real(wp) :: place   !! height [m]
     integer :: b, i
 
     released = .false.
@@ -62,9 +63,17 @@ contains
       b = due(i)
       if (free(i) .and. released) call check_place(walls, overlap, b, blocks, free(i))
       if (.not. free(i) .and. blocks%handling(b)%if_blocked == 'raise') then
-        call raise_block(walls, overlap, b, blocks, free(i))
-        if (free(i)) call warn(time, b, 'was raised by '//brief(blocks%raised(b), 3) &
-          //' m, its place is taken', blocks, warnings)
+        place = blocks%x(3, b)   ! above all that lies there, if it has room
+        blocks%x(3, b) = height_on_top(walls, blocks, b, overlap)
+        free(i) = blocks%x(3, b) > place
+        if (free(i)) free(i) = has_place(walls, blocks, b, overlap)
+        if (free(i)) then
+          blocks%raised(b) = blocks%x(3, b) - place
+          call warn(time, b, 'was raised by '//brief(blocks%raised(b), 3) &
+            //' m, its place is taken', blocks, warnings)
+        else
+          blocks%x(3, b) = place
+        end if
       end if
       if (free(i)) then
         if (pending(b)) call warn(time, b, 'found room and was released', blocks, warnings)
@@ -112,28 +121,6 @@ contains
     end if
     free = has_place(walls, blocks, b, overlap)
   end subroutine check_place
-
-  !> Raise a block above all that lies at its place, if it has room there.
-  subroutine raise_block(walls, overlap, b, blocks, free)
-    type(walls_t), intent(in) :: walls
-    type(overlap_t), intent(in) :: overlap
-    integer, intent(in) :: b
-    type(blocks_t), intent(inout) :: blocks
-    logical, intent(out) :: free
-    real(wp) :: place, height
-
-    place = blocks%x(3, b)
-    height = height_on_top(walls, blocks, b, overlap)
-    free = height > place
-    if (.not. free) return
-    blocks%x(3, b) = height
-    free = has_place(walls, blocks, b, overlap)
-    if (free) then
-      blocks%raised(b) = height - place
-    else
-      blocks%x(3, b) = place
-    end if
-  end subroutine raise_block
 
   !> Let go the lowered blocks that are where they should be, and find when the next of them will be
   !! if nothing changes.

@@ -4,7 +4,7 @@ module voxels_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces, clear_links
+  use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces
   use share_lists_m, only: body_shares_t
   implicit none
   private
@@ -257,7 +257,11 @@ contains
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, image, m, f(4)
 
-    call clear_links(solid)
+    do m = 1, solid%n_link   ! take away what the list of the last time says was there
+      f = solid%link(:, m)
+      solid%link_number(f(1), f(2), f(3), f(4)) = 0
+    end do
+    solid%n_link = 0
     do b = 1, size(body)
       do image = self%first_image(b), self%first_image(b + 1) - 1
         do m = 1, body(b)%n_hit

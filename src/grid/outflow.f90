@@ -178,7 +178,7 @@ contains
       real(wp), intent(in) :: c(:)    !! along the vertical axis [-]
       real(wp), intent(out) :: p(:)   !! [Pa]
       real(wp) :: weight, above, head, rise, lean, lean_above, half_jump
-      integer :: axis, k, l
+      integer :: axis, k, l, up
 
       axis = side%along(side%up)
       above = 0.0_wp
@@ -188,7 +188,8 @@ contains
                   *grid%h(axis)
       do l = 1, size(c)
         k = merge(size(c) + 1 - l, l, side%upward)   ! from the top down
-        lean = uneven(c, k, merge(1, -1, side%upward))
+        up = merge(1, -1, side%upward)   ! the last cells repeat beyond the ends of the column
+        lean = uneven_share(c(k), c(min(max(k - up, 1), size(c))), c(min(max(k + up, 1), size(c))))
         if (l > 1) head = head + half_jump*(lean_above - lean)   ! as `weight_at_faces`
         lean_above = lean
         weight = abs(fluid%gravity(axis))*grid%h(axis) &
@@ -201,17 +202,6 @@ contains
       rise = grid%h(axis)*sum(c) - max(side%depth, 0.0_wp)
       p = p - c*fluid%liquid_density*abs(fluid%gravity(axis))*rise
     end subroutine one_column
-
-    !> The uneven share of cell k of a column; the last cells repeat beyond its ends.
-    pure real(wp) function uneven(c, k, up)
-      real(wp), intent(in) :: c(:)
-      integer, intent(in) :: k, up   !! cell; step upwards
-      integer :: below, above
-
-      below = min(max(k - up, 1), size(c))
-      above = min(max(k + up, 1), size(c))
-      uneven = uneven_share(c(k), c(below), c(above))
-    end function uneven
   end subroutine set_pressure
 
   !> Pressure outside the side beside a cell, for a face at its mean velocity [Pa].

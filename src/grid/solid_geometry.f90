@@ -10,7 +10,7 @@ module solid_geometry_m
   public :: solid_geometry_t, solid_geometry_init, set_faces, apertures, mean_apertures
   public :: wall_area, edge_in, centre_in_fluid
   public :: link_to_wall, bounded_link
-  public :: clear_cells, clear_faces, clear_links, hand_over_faces
+  public :: clear_cells, clear_faces, hand_over_faces
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
   !! hold is taken away again (see `bed_solid_m`).
@@ -216,19 +216,6 @@ contains
     end do
     solid%n_closed = 0
   end subroutine clear_faces
-
-  !> The same of links.
-  pure subroutine clear_links(solid)
-    type(solid_geometry_t), intent(inout) :: solid
-    integer :: m
-
-    do m = 1, solid%n_link
-      associate (i => solid%link(:, m))
-        solid%link_number(i(1), i(2), i(3), i(4)) = 0
-      end associate
-    end do
-    solid%n_link = 0
-  end subroutine clear_links
 
   !> Effective apertures and links go from one geometry to another.
   subroutine hand_over_faces(from, to)

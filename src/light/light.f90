@@ -343,45 +343,34 @@ contains
     integer, intent(in) :: b
     type(blocks_t), intent(in) :: blocks
     type(light_t), intent(inout) :: light
-    real(wp) :: turn(3, 3), force(3), torque(3), height
+    real(wp) :: turn(3, 3), force(3), torque(3), height, v(3), omega(3), u(3), f(3)
+    integer :: j
 
     light%force(1:3, b) = -light%density*light%wet(b)*gravity
     light%force(4:6, b) = -light%density*cross(light%moment(:, b), gravity)
     if (light%wet(b) <= 0.0_wp) return
     associate (s => blocks%shape(b))
       turn = rotation_matrix(blocks%q(:, b))
-      height = light%level - blocks%x(3, b)
-      call facet_drag(light%facets(s), turn(3, :), min(height, blocks%shapes(s)%radius), &
-        matmul(blocks%v(:, b) - light%current, turn), matmul(blocks%omega(:, b), turn), force, &
-        torque)
+      height = min(light%level - blocks%x(3, b), blocks%shapes(s)%radius)
+      v = matmul(blocks%v(:, b) - light%current, turn)   ! body axes from here on
+      omega = matmul(blocks%omega(:, b), turn)
+      force = 0.0_wp
+      torque = 0.0_wp
+      associate (facets => light%facets(s))
+        do j = 1, facets%n   ! |u| (u.n) n S and its moment about the centre of mass
+          u = v + cross(omega, facets%centre(:, j))
+          f = wet_share(matmul(turn(3, :), facets%corner(:, :, j)) - height)*facets%area(j) &
+            *norm(u)*dot_product(u, facets%normal(:, j))*facets%normal(:, j)
+          force = force + f
+          torque = torque + cross(facets%centre(:, j), f)
+        end do
+      end associate
       force = 0.5_wp*light%density*light%drag(s)*matmul(turn, force)
       torque = 0.5_wp*light%density*light%drag(s)*matmul(turn, torque)
     end associate
     light%force(1:3, b) = light%force(1:3, b) - force
     light%force(4:6, b) = light%force(4:6, b) - torque
   end subroutine find_force
-
-  !> Sum over the facets of |u| (u.n) n S and of its moment about the centre of mass, body axes.
-  pure subroutine facet_drag(facets, up, height, v, omega, force, torque)
-    type(panels_t), intent(in) :: facets
-    real(wp), intent(in) :: up(3)      !! unit vector [-]
-    real(wp), intent(in) :: height     !! of the level over the centre, at most the radius [m]
-    real(wp), intent(in) :: v(3)       !! relative to the water [m/s]
-    real(wp), intent(in) :: omega(3)   !! [rad/s]
-    real(wp), intent(out) :: force(3), torque(3)   !! [m4/s2], [m5/s2]
-    real(wp) :: u(3), f(3)
-    integer :: j
-
-    force = 0.0_wp
-    torque = 0.0_wp
-    do j = 1, facets%n
-      u = v + cross(omega, facets%centre(:, j))
-      f = wet_share(matmul(up, facets%corner(:, :, j)) - height)*facets%area(j)*norm(u) &
-        *dot_product(u, facets%normal(:, j))*facets%normal(:, j)
-      force = force + f
-      torque = torque + cross(facets%centre(:, j), f)
-    end do
-  end subroutine facet_drag
 
   !> Share of a triangle below the level [-].
   pure function wet_share(h) result(share)

@@ -68,13 +68,25 @@ contains
     type(panels_t), intent(in) :: panels
     real(wp) :: a(6)
     real(wp) :: given(6, panels%n), sigma(6, panels%n), change(6, panels%n), potential(6)
-    real(wp), allocatable :: speed(:, :), inverse_distance(:, :)   ! (sources, places)
-    integer :: i, round
+    real(wp) :: pull(3)
+    real(wp), allocatable :: speed(:, :), inverse_distance(:, :)   ! (sources, places) [-], [m]
+    integer :: i, j, round
     real(wp), parameter :: relaxation = 1.3_wp, tolerance = 1.0e-8_wp
     integer, parameter :: max_rounds = 300
 
     allocate (speed(panels%n, panels%n), inverse_distance(panels%n, panels%n))
-    call influence(panels, speed, inverse_distance)
+    ! Normal velocity and potential (times -4 pi) at the centre of each panel from each panel with
+    ! sources of strength one.
+    !$omp parallel do private(i, j, pull) schedule(static)
+    do i = 1, panels%n
+      do j = 1, panels%n
+        call integrate_panel(panels%corner(:, :, j), panels%normal(:, j), panels%centre(:, i), &
+                             inverse_distance(j, i), pull)
+        speed(j, i) = -dot_product(pull, panels%normal(:, i))/(4.0_wp*pi)
+        if (j == i) speed(j, i) = 0.5_wp
+      end do
+    end do
+    !$omp end parallel do
     do i = 1, panels%n
       given(1:3, i) = panels%normal(:, i)
       given(4:6, i) = cross(panels%centre(:, i), panels%normal(:, i))
@@ -99,27 +111,6 @@ contains
       a(4:6) = a(4:6) - panels%area(i)*potential(4:6)*given(4:6, i)
     end do
   end function added_diagonal
-
-  !> Normal velocity and potential (times -4 pi) at the centre of each panel from each panel with
-  !! sources of strength one.
-  subroutine influence(panels, speed, inverse_distance)
-    type(panels_t), intent(in) :: panels
-    real(wp), intent(out) :: speed(:, :)              !! (sources, places) [-]
-    real(wp), intent(out) :: inverse_distance(:, :)   !! integral over the panel [m]
-    real(wp) :: pull(3)
-    integer :: i, j
-
-    !$omp parallel do private(i, j, pull) schedule(static)
-    do i = 1, panels%n
-      do j = 1, panels%n
-        call integrate_panel(panels%corner(:, :, j), panels%normal(:, j), panels%centre(:, i), &
-                             inverse_distance(j, i), pull)
-        speed(j, i) = -dot_product(pull, panels%normal(:, i))/(4.0_wp*pi)
-        if (j == i) speed(j, i) = 0.5_wp
-      end do
-    end do
-    !$omp end parallel do
-  end subroutine influence
 
   !> Integrals of 1/r and of (y - x)/r^3 over a triangle, r = |y - x|.
   pure subroutine integrate_panel(corner, normal, x, inverse, pull)

@@ -41,7 +41,7 @@ module momentum_c_ismac_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: c_ismac_t, c_ismac_init, flux_of_faces, begin_predictor, solve_predictor, &
+  public :: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor, &
             advected_velocity
 
   real(wp), parameter :: implicit_share = 0.75_wp   !! a, weight of the first-order operator
@@ -115,21 +115,6 @@ contains
     call krylov_init(stacked, self%work)
     allocate (self%rhs, self%delta, source=self%work%r)
   end subroutine c_ismac_init
-
-  !> Volumes of a velocity through whole faces in a step, for the mixture of fluid and solids.
-  subroutine flux_of_faces(grid, dt, uf, q)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
-    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m3]
-    integer :: d
-
-    do d = 1, 3
-      q(:, :, :, d) = dt*grid%area(d)*uf(:, :, :, d)
-    end do
-  end subroutine flux_of_faces
 
   !> Advection of the right side, at the velocity from which the step starts; `self%q` is set.
   subroutine begin_predictor(grid, u, self)
@@ -347,12 +332,26 @@ contains
     class(predictor_operator_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: x(:, :, :)
     real(wp), intent(inout), contiguous :: y(:, :, :)
-    integer :: b, l
+    integer :: b, i, j, k, l, m
     real(wp) :: motion(6)
 
     call unpack_components(x, self)
     call halo_exchange(self%x, 1)
-    call seven_points(self%lo, self%hi, self%low, self%high, self%inverse, self%x, self%y)
+    associate (v => self%x, low => self%low, high => self%high)
+      !$omp parallel do collapse(2) private(i, j) schedule(static) if (size(x) > worth_threads)
+      do m = 1, 3
+        do k = self%lo(3), self%hi(3)
+          do j = self%lo(2), self%hi(2)
+            do i = self%lo(1), self%hi(1)
+              self%y(i, j, k, m) = v(i, j, k, m) - self%inverse(i, j, k, m) &
+                *(low(i, j, k, 1)*v(i - 1, j, k, m) + high(i, j, k, 1)*v(i + 1, j, k, m) &
+                  + low(i, j, k, 2)*v(i, j - 1, k, m) + high(i, j, k, 2)*v(i, j + 1, k, m) &
+                  + low(i, j, k, 3)*v(i, j, k - 1, m) + high(i, j, k, 3)*v(i, j, k + 1, m))
+            end do
+          end do
+        end do
+      end do
+    end associate
     do b = 1, self%n
       if (.not. self%free(b)) cycle
       motion = matmul(self%mobility(:, :, b), pull_of_walls(self, b))
@@ -365,29 +364,6 @@ contains
     end do
     call pack_components(self, y)
   end subroutine apply_predictor
-
-  !> The part of the left side on the grid.
-  subroutine seven_points(lo, hi, low, high, inverse, x, y)
-    integer, intent(in) :: lo(3), hi(3)
-    real(wp), intent(in), dimension(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :), contiguous :: &
-      low, high, inverse, x
-    real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
-    integer :: i, j, k, m
-
-    !$omp parallel do collapse(2) private(i, j) schedule(static) if (size(x) > worth_threads)
-    do m = 1, 3
-      do k = lo(3), hi(3)
-        do j = lo(2), hi(2)
-          do i = lo(1), hi(1)
-            y(i, j, k, m) = x(i, j, k, m) - inverse(i, j, k, m) &
-              *(low(i, j, k, 1)*x(i - 1, j, k, m) + high(i, j, k, 1)*x(i + 1, j, k, m) &
-                + low(i, j, k, 2)*x(i, j - 1, k, m) + high(i, j, k, 2)*x(i, j + 1, k, m) &
-                + low(i, j, k, 3)*x(i, j, k - 1, m) + high(i, j, k, 3)*x(i, j, k + 1, m))
-          end do
-        end do
-      end do
-    end do
-  end subroutine seven_points
 
   !> Force and torque per velocity of what stands in `op%x` on body b, through its wall links.
   function pull_of_walls(op, b) result(pull)

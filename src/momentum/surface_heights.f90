@@ -97,6 +97,7 @@ contains
     type(column_t), intent(in) :: column   !! the middle one
     real(wp), intent(out) :: height(-1:1, -1:1)
     logical, intent(out) :: found
+    type(column_t) :: aside
     logical :: seen(-1:1, -1:1)
     integer :: a, b, x, y
 
@@ -111,8 +112,9 @@ contains
     do b = -1, 1
       do a = -1, 1
         if (.not. seen(a, b)) cycle
-        call nearest_height(grid, c, place, beside(a*unit_step(:, x) + b*unit_step(:, y)), &
-                            height(a, b), found)
+        aside = column
+        aside%at = column%at + a*unit_step(:, x) + b*unit_step(:, y)
+        call nearest_height(grid, c, place, aside, height(a, b), found)
         if (.not. found) return
       end do
     end do
@@ -128,14 +130,6 @@ contains
         end if
       end do
     end do
-  contains
-    !> The column that many cells aside.
-    pure type(column_t) function beside(step)
-      integer, intent(in) :: step(3)
-
-      beside = column
-      beside%at = column%at + step
-    end function beside
   end subroutine nine_heights
 
   !> Height of the surface in the column of a cell, over its centre, from the nearest cell of the

@@ -338,15 +338,28 @@ contains
     type(viscous_t), intent(inout) :: self
     integer, parameter :: sums = 11   ! K, S, M and viscosity times volume
     integer(i8) :: accumulator(accumulator_size, sums*bodies%n)
-    real(wp) :: total(sums*bodies%n), term(terms_at_once, 1)
+    real(wp) :: total(sums*bodies%n), term(terms_at_once, 1), moment(terms_at_once, 10)
     integer :: b, c, m, n, from, i(3)
 
     accumulator = spread(no_terms, 2, sums*bodies%n)
-    !$omp parallel private(b, from, n, m, i, term) if (self%walls%n > worth_threads)
+    !$omp parallel private(b, from, n, m, i, term, moment) if (self%walls%n > worth_threads)
     do b = 1, bodies%n
-      call add_moments(self%walls, b, accumulator(:, sums*b - 10:sums*b - 1))
-      ! Integral of the fluid's viscosity over the own cells of the body [Pa s m3]; the threads
-      ! share the work.
+      ! K, S and M (xx, yy, zz, xy, yz, zx) of the links of the body; the threads share the work.
+      !$omp do schedule(dynamic)
+      do from = self%walls%first(b), self%walls%first(b + 1) - 1, terms_at_once
+        n = min(terms_at_once, self%walls%first(b + 1) - from)
+        do m = 1, n
+          associate (k => self%walls%k(from + m - 1), r => self%walls%arm(:, from + m - 1))
+            moment(m, 1) = k
+            moment(m, 2:4) = k*r
+            moment(m, 5:7) = k*r**2
+            moment(m, 8:10) = k*[r(1)*r(2), r(2)*r(3), r(3)*r(1)]
+          end associate
+        end do
+        call exact_add_columns(moment(:n, :), accumulator(:, sums*b - 10:sums*b - 1))
+      end do
+      !$omp end do nowait
+      ! Integral of the fluid's viscosity over the own cells of the body [Pa s m3].
       !$omp do schedule(dynamic)
       do from = solid%body_cell(b), solid%body_cell(b + 1) - 1, terms_at_once
         n = 0
@@ -370,31 +383,6 @@ contains
       end do
     end do
   end subroutine bodies_seen_by_links
-
-  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the links of a body to their sums; the threads share
-  !! the work.
-  subroutine add_moments(walls, body, accumulator)
-    type(wall_links_t), intent(in) :: walls
-    integer, intent(in) :: body
-    integer(i8), intent(inout) :: accumulator(:, :)   !! (accumulator_size, 10)
-    real(wp) :: term(terms_at_once, 10)
-    integer :: from, m, n
-
-    !$omp do schedule(dynamic)
-    do from = walls%first(body), walls%first(body + 1) - 1, terms_at_once
-      n = min(terms_at_once, walls%first(body + 1) - from)
-      do m = 1, n
-        associate (k => walls%k(from + m - 1), r => walls%arm(:, from + m - 1))
-          term(m, 1) = k
-          term(m, 2:4) = k*r
-          term(m, 5:7) = k*r**2
-          term(m, 8:10) = k*[r(1)*r(2), r(2)*r(3), r(3)*r(1)]
-        end associate
-      end do
-      call exact_add_columns(term(:n, :), accumulator)
-    end do
-    !$omp end do nowait
-  end subroutine add_moments
 
   !> The 6 x 6 block from K, S and M.
   pure function held_by(moment) result(matrix)

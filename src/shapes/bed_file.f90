@@ -238,6 +238,7 @@ contains
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(in) :: form
     real(wp) :: step, length
+    integer :: f
 
     if (len(words%problem) > 0) return
     step = real(spacing(real(maxval(abs(form%point)), real32)), wp)
@@ -245,7 +246,12 @@ contains
     if (length >= fine*step) return
     if (length >= coarse*step .or. any(abs(form%point - real(real(form%point, real32), wp)) &
                                        > 0.0_wp)) then
-      if (.not. has_flat_facet(form)) return
+      do f = 1, size(form%triangle, 2)   ! has any facet no area?
+        associate (p => form%point(:, form%triangle(:, f)))
+          if (all(abs(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1))) <= 0.0_wp)) exit
+        end associate
+      end do
+      if (f > size(form%triangle, 2)) return
     end if
     words%line = 0
     call report(words, 'lies too far from zero: coordinates of ' &
@@ -253,20 +259,5 @@ contains
       //' m in single precision, and the form is ' &
       //to_text(length)//' m long; move it near zero where it was made, and write it anew')
   end subroutine check_rounding
-
-  !> Has any facet of a form no area?
-  pure function has_flat_facet(form) result(yes)
-    type(bed_form_t), intent(in) :: form
-    logical :: yes
-    integer :: f
-
-    yes = .false.
-    do f = 1, size(form%triangle, 2)
-      associate (p => form%point(:, form%triangle(:, f)))
-        yes = all(abs(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1))) <= 0.0_wp)
-      end associate
-      if (yes) return
-    end do
-  end function has_flat_facet
 
 end module bed_file_m

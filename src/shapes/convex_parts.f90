@@ -239,13 +239,17 @@ contains
     type(parts_t), intent(in) :: parts
     integer, allocatable, intent(out) :: facet(:), facet_point(:)
     logical :: free(parts%n_face)
-    integer :: f, g
+    integer :: f, g, k
 
     free = .true.
     do f = 1, parts%n_face
       do g = 1, f - 1
         if (.not. free(g)) cycle
-        if (.not. same_corners(parts, f, g)) cycle
+        associate (a => parts%corner(parts%first(f):parts%first(f + 1) - 1), &
+                   b => parts%corner(parts%first(g):parts%first(g + 1) - 1))
+          if (size(a) /= size(b)) cycle
+          if (.not. all([(any(b == a(k)), k=1, size(a))])) cycle
+        end associate
         free([f, g]) = .false.
         exit
       end do
@@ -258,21 +262,5 @@ contains
       facet = [facet, size(facet_point) + 1]
     end do
   end subroutine net_of_parts
-
-  pure function same_corners(parts, f, g) result(same)
-    type(parts_t), intent(in) :: parts
-    integer, intent(in) :: f, g
-    logical :: same
-    integer :: k
-
-    associate (a => parts%corner(parts%first(f):parts%first(f + 1) - 1), &
-               b => parts%corner(parts%first(g):parts%first(g + 1) - 1))
-      same = size(a) == size(b)
-      if (.not. same) return
-      do k = 1, size(a)
-        same = same .and. any(b == a(k))
-      end do
-    end associate
-  end function same_corners
 
 end module convex_parts_m

@@ -275,7 +275,7 @@ contains
     type(words_t), intent(inout) :: words
     logical, intent(in) :: blocks
     type(gmsh_t), intent(inout) :: mesh
-    integer :: n_block, n, b, i, in_block, found, kind, tags
+    integer :: n_block, n, b, i, k, in_block, found, kind, tags
 
     if (allocated(mesh%tet)) call report(words, '$Elements stands a second time')
     n_block = 1
@@ -299,7 +299,24 @@ contains
           call get_count(words, 'tags', 1, tags)
           call skip_integers(words, tags)
         end if
-        call read_element(words, kind, mesh)
+        if (kind < 1 .or. kind > size(nodes_of)) then
+          call report(words, 'element type '//to_text(kind)//' is unknown')
+        end if
+        if (len(words%problem) > 0) return
+        if (kind == tet_type) then
+          mesh%n_tet = mesh%n_tet + 1
+          do k = 1, 4
+            call get_integer(words, mesh%tet(k, mesh%n_tet))
+          end do
+          mesh%tet_line(mesh%n_tet) = words%line
+        else
+          call skip_integers(words, nodes_of(kind))
+          if (dimension_of(kind) == 3 .and. any(kind == [5, 6, 7])) then
+            mesh%n_other = mesh%n_other + 1
+          else if (dimension_of(kind) == 3) then
+            mesh%n_high = mesh%n_high + 1
+          end if
+        end if
         if (len(words%problem) > 0) return
       end do
       found = found + in_block
@@ -307,34 +324,6 @@ contains
     if (found < n) call report(words, 'fewer elements than announced')
     call end_section(words, '$EndElements')
   end subroutine read_elements
-
-  !> The corners of one element, kept if it is a tetrahedron.
-  subroutine read_element(words, kind, mesh)
-    type(words_t), intent(inout) :: words
-    integer, intent(in) :: kind
-    type(gmsh_t), intent(inout) :: mesh
-    integer :: k
-
-    if (kind < 1 .or. kind > size(nodes_of)) then
-      call report(words, 'element type '//to_text(kind)//' is unknown')
-    end if
-    if (len(words%problem) > 0) return
-    if (kind == tet_type) then
-      mesh%n_tet = mesh%n_tet + 1
-      do k = 1, 4
-        call get_integer(words, mesh%tet(k, mesh%n_tet))
-      end do
-      mesh%tet_line(mesh%n_tet) = words%line
-      return
-    end if
-    call skip_integers(words, nodes_of(kind))
-    if (dimension_of(kind) /= 3) return
-    if (any(kind == [5, 6, 7])) then
-      mesh%n_other = mesh%n_other + 1
-    else
-      mesh%n_high = mesh%n_high + 1
-    end if
-  end subroutine read_element
 
   !> Pass over n whole numbers.
   subroutine skip_integers(words, n)

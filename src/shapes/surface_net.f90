@@ -213,7 +213,16 @@ contains
       if (f == last) exit
       f = net%chain(f)
     end do
-    net%start(a) = border_edge(facet, net%head(b), net)
+    net%start(a) = 0   ! an edge at the border of the new piece
+    f = net%head(b)
+    find: do while (f > 0)
+      do e = facet(f), facet(f + 1) - 1
+        if (.not. at_border(e, net)) cycle
+        net%start(a) = e
+        exit find
+      end do
+      f = net%chain(f)
+    end do find
     joined = is_convex(net, a)
     if (joined) then
       net%head(a) = net%head(b)
@@ -229,23 +238,6 @@ contains
       f = net%chain(f)
     end do
   end subroutine try_to_join
-
-  !> An edge at the border of the piece whose chain begins with polygon `first`.
-  pure function border_edge(facet, first, net) result(e)
-    integer, intent(in) :: facet(:), first
-    type(net_t), intent(in) :: net
-    integer :: e
-    integer :: f
-
-    f = first
-    do while (f > 0)
-      do e = facet(f), facet(f + 1) - 1
-        if (at_border(e, net)) return
-      end do
-      f = net%chain(f)
-    end do
-    e = 0
-  end function border_edge
 
   !> Does an edge part two pieces?
   pure function at_border(e, net) result(yes)

@@ -203,11 +203,15 @@ contains
     end associate
   end subroutine order_by_body
 
-  !> Targets, normal and profile of each small cell.
+  !> Targets, normal and profile of each small cell: steps to its targets, their shares of it, r,
+  !! the distances of their fluid. r and distances as without a wall where there is no normal, r also
+  !! where the wall has an edge, which the stream of the targets passes straight.
   subroutine find_targets(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
+    integer, parameter :: here(3) = 0
+    real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: m, n, o(3), body
     integer :: step(3, max_targets, self%n_small)   ! from the small cells to their targets
 
@@ -217,10 +221,25 @@ contains
     call ensure_capacity(self%n_small, self%r_wall)
     call ensure_capacity(self%n_small, self%r)
     call ensure_capacity(self%n_small, self%distance)
-    !$omp parallel do schedule(static)
+    !$omp parallel do private(n, own) schedule(static)
     do m = 1, self%n_small
-      call find_wall(grid, solid, m, self, step(:, :, m))
-      self%r(:, m) = self%r_wall(:, m)
+      associate (c => self%cell(:, m), normal => self%normal(:, m), share => self%share(:, m), &
+                 r => self%r_wall(:, m), distance => self%distance(:, m))
+        normal = wall_normal(grid, solid, c)
+        r = 1.0_wp
+        self%r(:, m) = 1.0_wp
+        distance = 0.0_wp
+        call to_targets(grid, solid, c, normal, step(:, :, m), share)
+        if (all(abs(normal) <= 0.0_wp)) cycle
+        own = distance_to_fluid(grid, solid, c, here, normal)
+        do n = 1, max_targets
+          if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + step(:, n, m), n_halo)) cycle
+          distance(n) = distance_to_fluid(grid, solid, c, step(:, n, m), normal)
+          r(n) = max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
+          r(n) = r(n) + edge_in(solid, c)*(1.0_wp - r(n))
+        end do
+        self%r(:, m) = r
+      end associate
     end do
     do m = 1, self%n_small
       body = self%body(m)
@@ -233,36 +252,6 @@ contains
       end do
     end do
   end subroutine find_targets
-
-  !> Normal of the wall of small cell m, the steps to its targets, their shares of it, r, and the
-  !! distances of their fluid; r and distances as without a wall where there is no normal, r
-  !! also where the wall has an edge, which the stream of the targets passes straight.
-  subroutine find_wall(grid, solid, m, self, steps)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: m
-    type(merged_cells_t), intent(inout) :: self
-    integer, intent(out) :: steps(3, max_targets)
-    integer, parameter :: here(3) = 0
-    real(wp) :: own   !! distance of the fluid of the small cell [m]
-    integer :: n
-
-    associate (c => self%cell(:, m), normal => self%normal(:, m), share => self%share(:, m), &
-               r => self%r_wall(:, m), distance => self%distance(:, m))
-      normal = wall_normal(grid, solid, c)
-      r = 1.0_wp
-      distance = 0.0_wp
-      call to_targets(grid, solid, c, normal, steps, share)
-      if (all(abs(normal) <= 0.0_wp)) return
-      own = distance_to_fluid(grid, solid, c, here, normal)
-      do n = 1, max_targets
-        if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
-        distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
-        r(n) = max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
-        r(n) = r(n) + edge_in(solid, c)*(1.0_wp - r(n))
-      end do
-    end associate
-  end subroutine find_wall
 
   !> r of each small cell and target by their densities,
   !! $$ 1 - r = (1 - r_w) \min(1, \rho_t/\rho_s). $$
@@ -367,7 +356,7 @@ contains
   subroutine group_small_cells(grid, self)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(inout) :: self
-    integer :: m, n, f, g, n_parts
+    integer :: m, n, f, g, n_parts, moved(2)
     integer :: group(self%n)   ! of each target; first the number of its parts
 
     group = 0
@@ -404,34 +393,25 @@ contains
         self%part(:, self%first(g)) = [f, n]
       end do
     end do
-    !$omp parallel do schedule(static)
-    do g = 1, self%n_groups
-      call sort_parts(self%cell(:, self%leader(g)), self%cell, &
-                      self%part(:, self%first(g):self%first(g + 1) - 1))
-    end do
-  end subroutine group_small_cells
-
-  !> Parts of small cells in the order of the small cells' places around the leader.
-  pure subroutine sort_parts(leader, cell, part)
-    integer, intent(in) :: leader(3), cell(:, :)
-    integer, intent(inout) :: part(:, :)   !! (2, *)
-    integer :: m, n, moved(2)
-
-    do m = 2, size(part, 2)
-      moved = part(:, m)
-      do n = m, 2, -1
-        if (place(part(1, n - 1)) < place(moved(1))) exit
-        part(:, n) = part(:, n - 1)
+    !$omp parallel do private(m, n, moved) schedule(static)
+    do g = 1, self%n_groups   ! in the order of the small cells' places around the leader
+      do m = self%first(g) + 1, self%first(g + 1) - 1
+        moved = self%part(:, m)
+        do n = m, self%first(g) + 1, -1
+          if (place(g, self%part(1, n - 1)) < place(g, moved(1))) exit
+          self%part(:, n) = self%part(:, n - 1)
+        end do
+        self%part(:, n) = moved
       end do
-      part(:, n) = moved
     end do
   contains
-    pure integer function place(small)
-      integer, intent(in) :: small
+    !> Place of a small cell around the leader of group g, as a number.
+    pure integer function place(g, small)
+      integer, intent(in) :: g, small
 
-      place = dot_product(cell(:, small) - leader, [1, 3, 9])
+      place = dot_product(self%cell(:, small) - self%cell(:, self%leader(g)), [1, 3, 9])
     end function place
-  end subroutine sort_parts
+  end subroutine group_small_cells
 
   !> Is this small cell a group of its own?
   elemental function is_unmerged(self, small) result(yes)
