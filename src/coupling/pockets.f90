@@ -174,7 +174,7 @@ contains
         if (f(d) > grid%last(d)) cycle
         if (solid%aperture(f(1), f(2), f(3), d) <= 0.0_wp) cycle
         if (n(d) < self%low(d) .or. n(d) > self%high(d)) then
-          if (leads_out(grid, d, s, n(d))) return
+          if (grid%beyond(n(d), d) .and. .not. is_wall(grid%side(s, d))) return
         else if (solid%alpha(n(1), n(2), n(3)) <= 0.0_wp) then
           return
         end if
@@ -182,15 +182,5 @@ contains
     end do
     touches_free_cell = .false.
   end function touches_free_cell
-
-  !> Is a cell index beyond a side of the domain through which fluid may pass?
-  pure logical function leads_out(grid, d, s, index)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: d, s, index
-
-    leads_out = .false.
-    if (grid%periodic(d) .or. (index >= 1 .and. index <= grid%n(d))) return
-    leads_out = .not. is_wall(grid%side(s, d))
-  end function leads_out
 
 end module pockets_m

@@ -106,7 +106,18 @@ contains
     self%first_face(bodies%n + 1) = n_face + 1
     !$omp parallel private(b) if (n_face > worth_threads)
     do b = 1, bodies%n
-      call faces_of_body(b)
+      !$omp do schedule(static)
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        call set_face(m - solid%body_face(b) + self%first_face(b), b, solid%face(:, m), &
+                      solid%face_beta(m), solid%face_centroid(:, m))
+      end do
+      !$omp end do nowait
+      !$omp do schedule(static)
+      do m = solid%first_held(b), solid%first_held(b + 1) - 1
+        call set_face(m - solid%first_held(b) + self%held_from(b), b, solid%held_face(:, m), &
+                      solid%held_share(m), middle_of_face(grid, solid%held_face(:, m)))
+      end do
+      !$omp end do nowait
     end do
     !$omp end parallel
     n_entry = 0
@@ -128,26 +139,6 @@ contains
     end do
     self%first(bodies%n + 1) = n_entry + 1
   contains
-    !> Faces of body b and their unit fluxes; each thread some of them.
-    subroutine faces_of_body(b)
-      integer, intent(in) :: b
-      integer :: m, n
-
-      !$omp do schedule(static)
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        n = m - solid%body_face(b) + self%first_face(b)
-        call set_face(n, b, solid%face(:, m), solid%face_beta(m), solid%face_centroid(:, m))
-      end do
-      !$omp end do nowait
-      !$omp do schedule(static)
-      do m = solid%first_held(b), solid%first_held(b + 1) - 1
-        n = m - solid%first_held(b) + self%held_from(b)
-        call set_face(n, b, solid%held_face(:, m), solid%held_share(m), &
-                      middle_of_face(grid, solid%held_face(:, m)))
-      end do
-      !$omp end do nowait
-    end subroutine faces_of_body
-
     !> Face n of the list, a share of which moves with body b.
     subroutine set_face(n, b, f, share, x)
       integer, intent(in) :: n, b, f(4)

@@ -32,7 +32,7 @@ module momentum_c_ismac_m
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, mp_scheme
-  use viscous_system_m, only: viscous_t
+  use viscous_system_m, only: viscous_t, wall_links_t
   use viscous_m, only: apply_viscous, pull_of_links, velocity_scale, inertial_momentum
   use linear_operator_m, only: linear_operator_t, identity_t
   use solve_control_m, only: solve_control_t, solve_report_t, solved
@@ -57,11 +57,11 @@ module momentum_c_ismac_m
     real(wp), allocatable :: low(:, :, :, :), high(:, :, :, :)
     real(wp), allocatable :: inverse(:, :, :, :)   !! of the diagonal, 0: not an unknown [s/kg]
     real(wp), allocatable :: x(:, :, :, :), y(:, :, :, :)   !! by component, one halo cell
-    ! Wall links by body, as in viscous_t, and the bodies eliminated.
+    ! Wall links of the viscous system while it is solved, and the bodies eliminated.
     integer :: n = 0                               !! bodies
     logical, allocatable :: free(:)
-    integer, allocatable :: first(:), cell(:, :)
-    real(wp), allocatable :: k(:), arm(:, :), work(:, :)
+    type(wall_links_t), pointer :: walls => null()
+    real(wp), allocatable :: work(:, :)            !! (at least the links of a body, 6)
     real(wp), allocatable :: mobility(:, :, :)     !! (6, 6, n) motion per impulse rate, 0: held
   contains
     procedure :: apply => apply_predictor
@@ -108,8 +108,7 @@ contains
       allocate (op%high, op%inverse, op%x, op%y, source=op%low)
       allocate (op%free(n), source=.false.)
       allocate (op%mobility(6, 6, n), source=0.0_wp)
-      allocate (op%first(n + 1), source=1)
-      allocate (op%cell(3, 0), op%k(0), op%arm(3, 0), op%work(0, 6))
+      allocate (op%work(0, 6))
     end associate
     call stacked%own(grid%lo, [grid%hi(1:2), grid%lo(3) + 3*(grid%hi(3) - grid%lo(3) + 1) - 1])
     call krylov_init(stacked, self%work)
@@ -156,7 +155,7 @@ contains
       !! that of the system [kg/m3]
     type(rigid_motion_t), intent(inout) :: bodies
     type(flow_t), intent(inout) :: flow
-    type(viscous_t), intent(inout) :: viscous
+    type(viscous_t), intent(inout), target :: viscous
     type(c_ismac_t), intent(inout) :: self
     real(wp), dimension(6, bodies%n) :: none, pull, motion
     type(solve_control_t) :: control
@@ -208,10 +207,10 @@ contains
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt
-    type(viscous_t), intent(in) :: viscous
+    type(viscous_t), intent(in), target :: viscous
     type(c_ismac_t), intent(inout) :: self
     integer :: i, j, k, d, m, e(3)
-    real(wp) :: inflow
+    real(wp) :: inflow, unit(6), matrix(6, 6)
 
     associate (op => self%operator)
       !$omp parallel do private(i, j, d, m, e, inflow) schedule(static)
@@ -240,7 +239,25 @@ contains
         end do
       end do
     end associate
-    call eliminate_bodies(bodies, dt, viscous, self%operator)
+    ! Wall links, and the motion that an impulse rate gives each free body when the links hold it.
+    associate (op => self%operator, walls => viscous%walls)
+      if (size(op%work, 1) < walls%n) then
+        deallocate (op%work)
+        allocate (op%work(2*walls%n, 6))
+      end if
+      op%walls => viscous%walls
+      op%free = bodies%free
+      do i = 1, bodies%n
+        op%mobility(:, :, i) = 0.0_wp
+        if (.not. bodies%free(i)) cycle
+        do m = 1, 6
+          unit = 0.0_wp
+          unit(m) = 1.0_wp
+          matrix(:, m) = viscous%body_matrix(:, m, i) + inertial_momentum(bodies, i, dt, unit)
+        end do
+        op%mobility(:, :, i) = inverse_of(matrix)
+      end do
+    end associate
   contains
     !> Conductance a rho q/dt of the volume that enters a cell through one face [kg/s]; none where
     !! it enters with the velocity of the cell itself, through an open side of the domain.
@@ -254,37 +271,6 @@ contains
       if (grid%side(s, d) /= side_inflow) conductance = 0.0_wp
     end function share_of
   end subroutine set_operator
-
-  !> Wall links, and the motion that an impulse rate gives each free body when the links hold it.
-  subroutine eliminate_bodies(bodies, dt, viscous, op)
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: dt
-    type(viscous_t), intent(in) :: viscous
-    type(predictor_operator_t), intent(inout) :: op
-    real(wp) :: unit(6), matrix(6, 6)
-    integer :: b, c, n
-
-    n = viscous%walls%n
-    if (size(op%k) < n) then
-      deallocate (op%cell, op%k, op%arm, op%work)
-      allocate (op%cell(3, 2*n), op%k(2*n), op%arm(3, 2*n), op%work(2*n, 6))
-    end if
-    op%first = viscous%walls%first
-    op%cell(:, 1:n) = viscous%walls%cell(:, 1:n)
-    op%k(1:n) = viscous%walls%k(1:n)
-    op%arm(:, 1:n) = viscous%walls%arm(:, 1:n)
-    op%free = bodies%free
-    do b = 1, bodies%n
-      op%mobility(:, :, b) = 0.0_wp
-      if (.not. bodies%free(b)) cycle
-      do c = 1, 6
-        unit = 0.0_wp
-        unit(c) = 1.0_wp
-        matrix(:, c) = viscous%body_matrix(:, c, b) + inertial_momentum(bodies, b, dt, unit)
-      end do
-      op%mobility(:, :, b) = inverse_of(matrix)
-    end do
-  end subroutine eliminate_bodies
 
   !> The right side over the diagonal: all accelerations at u^n, walls with the given motions.
   subroutine right_side(grid, rho, dt, u, motion, viscous, self)
@@ -310,10 +296,10 @@ contains
         end do
       end do
       do b = 1, op%n
-        do l = op%first(b), op%first(b + 1) - 1
-          associate (c => op%cell(:, l))
+        do l = op%walls%first(b), op%walls%first(b + 1) - 1
+          associate (c => op%walls%cell(:, l))
             op%y(c(1), c(2), c(3), :) = op%y(c(1), c(2), c(3), :) &
-                                        + op%k(l)*wall_velocity(motion(:, b), op%arm(:, l))
+              + op%walls%k(l)*wall_velocity(motion(:, b), op%walls%arm(:, l))
           end associate
         end do
       end do
@@ -355,10 +341,10 @@ contains
     do b = 1, self%n
       if (.not. self%free(b)) cycle
       motion = matmul(self%mobility(:, :, b), pull_of_walls(self, b))
-      do l = self%first(b), self%first(b + 1) - 1
-        associate (c => self%cell(:, l))
+      do l = self%walls%first(b), self%walls%first(b + 1) - 1
+        associate (c => self%walls%cell(:, l))
           self%y(c(1), c(2), c(3), :) = self%y(c(1), c(2), c(3), :) - self%inverse(c(1), c(2), &
-            c(3), :)*self%k(l)*wall_velocity(motion, self%arm(:, l))
+            c(3), :)*self%walls%k(l)*wall_velocity(motion, self%walls%arm(:, l))
         end associate
       end do
     end do
@@ -373,11 +359,11 @@ contains
     integer(i8) :: accumulator(accumulator_size, 6)
     integer :: l, n
 
-    n = op%first(b + 1) - op%first(b)
+    n = op%walls%first(b + 1) - op%walls%first(b)
     do l = 1, n
-      associate (m => op%first(b) + l - 1)
-        associate (c => op%cell(:, m))
-          op%work(l, :) = wrench(op%k(m)*op%x(c(1), c(2), c(3), :), op%arm(:, m))
+      associate (m => op%walls%first(b) + l - 1)
+        associate (c => op%walls%cell(:, m))
+          op%work(l, :) = wrench(op%walls%k(m)*op%x(c(1), c(2), c(3), :), op%walls%arm(:, m))
         end associate
       end associate
     end do

@@ -27,13 +27,6 @@ module bed_m
   integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
 
-  !> The surface above and below a place: heights, and 1 for facets that look up, -1 for others.
-  type :: layers_t
-    integer :: n = 0
-    real(wp), allocatable :: height(:)   !! falling [m]
-    integer, allocatable :: way(:)
-  end type layers_t
-
   real(wp), parameter :: round_off = 1.0e-6_wp   !! of coordinates in files, over the tank [-]
   real(wp), parameter :: same_place = 1.0e-7_wp  !! points nearer are one, over the bed [-]
 
@@ -265,11 +258,13 @@ contains
     type(case_t), intent(in) :: case
     type(bed_t), intent(in) :: bed
     character(:), allocatable, intent(out) :: message
-    type(layers_t) :: layers
-    real(wp) :: p(3, max_clip_corners), low(3), high(3), at(3), top
-    integer :: f, n, k, depth
+    real(wp), allocatable :: height(:)   ! of the facets above and below a place, falling [m]
+    integer, allocatable :: way(:)       ! 1: looks up, -1: down
+    real(wp) :: p(3, max_clip_corners), low(3), high(3), at(3), top, same, z
+    integer :: f, g, n, k, m, bin, depth, turn
 
     message = ''
+    same = round_off*case%grid%length(3)   ! heights nearer than this are equal
     low = case%grid%origin
     high = case%grid%origin + case%grid%length
     top = -huge(top)
@@ -278,12 +273,30 @@ contains
       if (n < 3) cycle
       top = max(top, maxval(p(3, :n)))
       at = sum(p(:, :n), 2)/real(n, wp)
-      call find_layers(bed, at, round_off*case%grid%length(3), layers)
+      n = 0
+      bin = column_of(bed, at)
+      do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
+        g = bed%columns%item(m)
+        turn = way_of(bed, g, at)
+        if (turn == 0) cycle
+        z = height_of(bed, g, at)
+        n = n + 1
+        call ensure_capacity(n, height)
+        call ensure_capacity(n, way)
+        do k = n, 2, -1   ! equal heights: those that look down first
+          if (height(k - 1) > z + same &
+              .or. (height(k - 1) > z - same .and. way(k - 1) <= turn)) exit
+          height(k) = height(k - 1)
+          way(k) = way(k - 1)
+        end do
+        height(k) = z
+        way(k) = turn
+      end do
       depth = 0
-      do k = 1, layers%n
-        depth = depth + layers%way(k)
+      do k = 1, n
+        depth = depth + way(k)
         if (depth == 0 .or. depth == 1) cycle
-        at(3) = layers%height(k)
+        at(3) = height(k)
         if (depth < 0) then
           message = 'the facet at '//point_text(at)//' looks down with no solid above it: its ' &
             //'corners must run counter-clockwise seen from outside'
@@ -301,38 +314,6 @@ contains
       message = 'the bed lies below the tank'
     end if
   end subroutine check_layers
-
-  !> All facets above and below a place, from the top; equal heights: those that look down first.
-  subroutine find_layers(bed, at, same, layers)
-    type(bed_t), intent(in) :: bed
-    real(wp), intent(in) :: at(3)
-    real(wp), intent(in) :: same   !! heights nearer than this are equal [m]
-    type(layers_t), intent(inout) :: layers
-    real(wp) :: height
-    integer :: bin, m, f, way, k
-
-    layers%n = 0
-    bin = column_of(bed, at)
-    do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
-      f = bed%columns%item(m)
-      way = way_of(bed, f, at)
-      if (way == 0) cycle
-      height = height_of(bed, f, at)
-      layers%n = layers%n + 1
-      call ensure_capacity(layers%n, layers%height)
-      call ensure_capacity(layers%n, layers%way)
-      k = layers%n
-      do while (k > 1)
-        if (layers%height(k - 1) > height + same .or. (layers%height(k - 1) > height - same .and. &
-            layers%way(k - 1) <= way)) exit
-        layers%height(k) = layers%height(k - 1)
-        layers%way(k) = layers%way(k - 1)
-        k = k - 1
-      end do
-      layers%height(k) = height
-      layers%way(k) = way
-    end do
-  end subroutine find_layers
 
   !> Bin of the facets above and below a place.
   pure function column_of(bed, at) result(bin)

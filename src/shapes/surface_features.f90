@@ -32,7 +32,7 @@ contains
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: is_corner(:)
-    integer :: e, m
+    integer :: e, f, m
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -44,7 +44,17 @@ contains
       return
     end if
     surface%length = 0.25_wp*shape%smallest_edge
-    call make_facets(shape, surface)
+    m = size(shape%facet) - 1   ! planes and sides of the facets
+    surface%side = shape%facet
+    allocate (surface%normal(3, m), surface%offset(m))
+    allocate (surface%side_normal(3, size(shape%facet_point)))
+    allocate (surface%side_offset(size(shape%facet_point)))
+    do f = 1, m
+      associate (a => shape%facet(f), b => shape%facet(f + 1) - 1)
+        call set_facet(shape%point(:, corners(shape, f)), surface%normal(:, f), &
+          surface%offset(f), surface%side_normal(:, a:b), surface%side_offset(a:b))
+      end associate
+    end do
     call find_features(shape%point, shape%facet, shape%facet_point, edge, surface%n_convex, &
       point_normal, is_corner)
     m = count(edge(4, :) > 0)
@@ -98,25 +108,6 @@ contains
     e = [(f, f=1, n)]
     edge = pair(:, [pack(e, bend > 0), pack(e, bend < 0), pack(e, pair(4, :) == 0)])
   end subroutine find_features
-
-  !> Planes and sides of the facets.
-  pure subroutine make_facets(shape, surface)
-    type(shape_t), intent(in) :: shape
-    type(surface_t), intent(inout) :: surface
-    integer :: f, n
-
-    n = size(shape%facet) - 1
-    surface%side = shape%facet
-    allocate (surface%normal(3, n), surface%offset(n))
-    allocate (surface%side_normal(3, size(shape%facet_point)))
-    allocate (surface%side_offset(size(shape%facet_point)))
-    do f = 1, n
-      associate (a => shape%facet(f), b => shape%facet(f + 1) - 1)
-        call set_facet(shape%point(:, corners(shape, f)), surface%normal(:, f), &
-          surface%offset(f), surface%side_normal(:, a:b), surface%side_offset(a:b))
-      end associate
-    end do
-  end subroutine make_facets
 
   !> Plane and sides of a facet.
   pure subroutine set_facet(p, normal, offset, side_normal, side_offset)

@@ -111,26 +111,15 @@ contains
           self%s(p, m, j, k) = merge(1.0_sp/root, 0.0_sp, diagonal > 0.0_sp)
         end do
       end do
-      self%line(:, j, k) = range_of_work(self%a(1), self%t(:, :, j, k))
+      ! First and last pair of the vectors that hold the open cells of the line; first > last: none.
+      self%line(:, j, k) = [self%z(1), self%a(1)]
+      do p = self%a(1) + 1, self%z(1) - 1, vector
+        if (all(self%t(p:p + vector - 1, :, j, k) <= 0.0_sp)) cycle
+        self%line(1, j, k) = min(self%line(1, j, k), p)
+        self%line(2, j, k) = p + vector - 1
+      end do
     end do
   end subroutine set_diagonal
-
-  !> First and last pair of the vectors that hold the open cells of a line; first > last: none.
-  pure function range_of_work(a, t) result(range)
-    integer, intent(in) :: a
-    real(sp), intent(in) :: t(a:, :)   !! roots of the diagonal; pair a lies in the halo
-    integer :: range(2)
-    integer :: p, from, to
-
-    from = ubound(t, 1)
-    to = a
-    do p = a + 1, ubound(t, 1) - 1, vector
-      if (all(t(p:p + vector - 1, :) <= 0.0_sp)) cycle
-      from = min(from, p)
-      to = p + vector - 1
-    end do
-    range = [from, to]
-  end function range_of_work
 
   !> Scaled coefficients of the lower faces of plane k, upper sides of the last cells included.
   !!

@@ -204,8 +204,8 @@ contains
   end subroutine order_by_body
 
   !> Targets, normal and profile of each small cell: steps to its targets, their shares of it, r,
-  !! the distances of their fluid. r and distances as without a wall where there is no normal, r also
-  !! where the wall has an edge, which the stream of the targets passes straight.
+  !! the distances of their fluid. r and distances as without a wall where there is no normal, r
+  !! also where the wall has an edge, which the stream of the targets passes straight.
   subroutine find_targets(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
