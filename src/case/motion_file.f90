@@ -36,7 +36,6 @@ contains
     integer :: b, i
 
     do b = 1, size(case%body)
-      if (.not. allocated(case%body(b)%motion)) cycle
       if (len_trim(case%body(b)%motion) == 0) cycle
       found = problems_t()
       associate (body => case%body(b))

@@ -43,7 +43,6 @@ contains
 
     do i = 1, size(case%drop)
       associate (drop => case%drop(i))
-        if (.not. allocated(drop%file)) cycle
         if (len_trim(drop%file) == 0) cycle
         found = problems_t()
         call read_drop([case%shape%name, (member_name(case%shape(k), case%shape(k)%member), &

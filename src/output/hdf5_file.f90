@@ -38,8 +38,8 @@ module hdf5_file_m
     procedure, private :: store_numbers, store_texts, read_reals, read_integers, read_texts
     generic :: store => store_numbers, store_texts
     generic :: read => read_reals, read_integers, read_texts
-    procedure :: shape_of, new_blocks, write_block
-    procedure :: new_dataset, find, pass_part   ! for columns
+    procedure :: shape_of, write_block
+    procedure :: begin_dataset, find, pass_part   ! for columns
   end type h5_file_t
 
 contains
@@ -106,12 +106,7 @@ contains
     type(c_ptr), intent(in) :: data
     integer :: status
 
-    if (self%has(dataset%name)) then
-      call h5dopen_f(self%id, dataset%name, dataset%id, status)
-      call self%check(status, 'open '//dataset%name)
-    else
-      call self%new_dataset(dataset, H5P_DEFAULT_F)
-    end if
+    call self%begin_dataset(dataset, H5P_DEFAULT_F)
     if (self%info /= 0) return
     if (product(dataset%extent) > 0 .and. (is_root() .or. .not. self%shared)) then
       call h5dwrite_f(dataset%id, dataset%here, data, status)
@@ -120,18 +115,23 @@ contains
     call h5dclose_f(dataset%id, status)
   end subroutine put
 
-  !> Create a dataset of any type, with its unit; `list` of a growing one says how it is cut.
-  subroutine new_dataset(self, dataset, list)
+  !> Open a dataset, or create it with its unit; `list` says how it is stored.
+  subroutine begin_dataset(self, dataset, list)
     class(h5_file_t), intent(inout) :: self
     class(dataset_t), intent(inout) :: dataset
-    integer(hid_t), intent(in) :: list     !! H5P_DEFAULT_F: the shape never changes
+    integer(hid_t), intent(in) :: list
     integer(hsize_t) :: largest(size(dataset%extent))
     integer(hid_t) :: space
     integer :: status
 
+    if (self%has(dataset%name)) then
+      call h5dopen_f(self%id, dataset%name, dataset%id, status)
+      call self%check(status, 'open '//dataset%name)
+      return
+    end if
     if (self%info /= 0) return
     largest = dataset%extent
-    if (list /= H5P_DEFAULT_F) then
+    if (list /= H5P_DEFAULT_F) then   ! a column grows
       where (dataset%extent == 0) largest = H5S_UNLIMITED_F
     end if
     call h5screate_simple_f(size(largest), dataset%extent, space, status, largest)
@@ -139,7 +139,7 @@ contains
     call self%check(status, 'create '//dataset%name)
     if (self%info == 0) call h5sclose_f(space, status)
     call self%attribute(dataset%name, 'units', dataset%units)
-  end subroutine new_dataset
+  end subroutine begin_dataset
 
   !> All elements of a dataset, in a row; their number must be right. Or those of its block
   !! `first : first + extent - 1`.
@@ -247,11 +247,14 @@ contains
     if (self%info == 0) call h5dclose_f(dataset%id, status)
   end subroutine shape_of
 
-  !> Create a dataset of doubles that all processes fill block by block; zero where none is written.
-  subroutine new_blocks(self, name, units, extent)
+  !> Write the block `first : first + extent - 1` of a dataset of doubles that all processes fill
+  !! block by block; zero where none is written. All together in a shared file.
+  subroutine write_block(self, name, units, whole, first, extent, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in) :: extent(:)
+    integer, intent(in) :: whole(:)   !! extent of the dataset
+    integer, intent(in) :: first(:), extent(:)
+    real(wp), intent(in), target, contiguous :: a(:)   !! the block's elements in a row
     type(dataset_t) :: dataset
     integer(hid_t) :: list
     integer :: status
@@ -259,26 +262,10 @@ contains
     if (self%info /= 0) return
     call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
     call h5pset_fill_time_f(list, H5D_FILL_TIME_ALLOC_F, status)
-    dataset = dataset_t(name, units, H5T_NATIVE_DOUBLE, extent=int(extent, hsize_t))
-    call self%new_dataset(dataset, list)
+    dataset = dataset_t(name, units, H5T_NATIVE_DOUBLE, H5T_NATIVE_DOUBLE, &
+                        extent=int(whole, hsize_t))
+    call self%begin_dataset(dataset, list)
     call h5pclose_f(list, status)
-    if (self%info == 0) call h5dclose_f(dataset%id, status)
-  end subroutine new_blocks
-
-  !> Write the block `first : first + extent - 1` of a dataset of `new_blocks`; all processes
-  !! together in a shared file.
-  subroutine write_block(self, name, first, extent, a)
-    class(h5_file_t), intent(inout) :: self
-    character(*), intent(in) :: name
-    integer, intent(in) :: first(:), extent(:)
-    real(wp), intent(in), target, contiguous :: a(:)   !! the block's elements in a row
-    type(dataset_t) :: dataset
-    integer :: status
-
-    if (self%info /= 0) return
-    dataset = dataset_t(name, here=H5T_NATIVE_DOUBLE)
-    call h5dopen_f(self%id, name, dataset%id, status)
-    call self%check(status, 'open '//name)
     call self%pass_part(dataset, int(first - 1, hsize_t), int(extent, hsize_t), c_loc(a), &
                         self%transfer)
     if (self%info == 0) call h5dclose_f(dataset%id, status)

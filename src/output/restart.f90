@@ -127,11 +127,11 @@ contains
     do i = 1, list%n
       associate (item => list%item(i))
         if (associated(item%cells)) then   ! each process its part
-          call file%new_blocks(item%name, item%units, item%extent)
           do d = 1, item%extent(4)
             call item%part(list%grid, d, first, last)
-            call file%write_block(item%name, [first, d], [last - first + 1, 1], &
-              [item%cells(first(1):last(1), first(2):last(2), first(3):last(3), d)])
+            call file%write_block(item%name, item%units, item%extent, [first, d], &
+              [last - first + 1, 1], [item%cells(first(1):last(1), first(2):last(2), &
+              first(3):last(3), d)])
           end do
         else if (associated(item%reals)) then
           call file%store(item%name, item%units, item%reals, item%extent)

@@ -219,7 +219,7 @@ contains
       call h5pset_fill_value_f(list, H5T_NATIVE_DOUBLE, c_loc(nothing), status(7))
     end if
     call file%check(minval(status), 'create '//column%name)
-    call file%new_dataset(column, list)
+    call file%begin_dataset(column, list)
     call h5pclose_f(list, status(1))
   end subroutine create_column
 
@@ -308,8 +308,7 @@ contains
     call self%file%create(path, shared)
     call self%write_head(state)
     call self%pass_list(creating, state)
-    if (allocated(self%counter)) call self%file%attribute(self%counter, 'NSteps', [0])
-    call self%file%flush()
+    call self%count_rows(0)
   end subroutine create
 
   !> Open the file of a run that goes on from `state`; nothing in it is changed yet. The run keeps
