@@ -120,11 +120,14 @@ contains
     yes = c_faccessat(self%number, name//c_null_char, 0_c_int, 0_c_int) == 0
   end function has
 
-  !> Delete a file of the folder that is held, if it is there.
+  !> Delete a file of the folder that is held, if it is there and the folder is still that of this
+  !! run.
   subroutine remove(self, name)
-    class(folder_lock_t), intent(in) :: self
+    class(folder_lock_t), intent(inout) :: self
     character(*), intent(in) :: name
 
+    if (.not. self%held) return
+    if (.not. is_ours(self)) return
     if (c_unlinkat(self%number, name//c_null_char, 0_c_int) /= 0) return   ! it was not there
   end subroutine remove
 
@@ -145,7 +148,7 @@ contains
     class(folder_lock_t), intent(inout) :: self
 
     if (.not. self%held) return
-    if (is_ours(self)) call self%remove(lock_name(2:))
+    call self%remove(lock_name(2:))
     call close_all(self)
     self%held = .false.
   end subroutine release_lock

@@ -16,12 +16,10 @@ module output_m
   use output_folder_m, only: prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
   use diagnostics_m, only: step_report_t, make_row
-  use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
-    close_run_file
+  use write_run_m, only: run_file_t
   use write_vtkhdf_m, only: field_file_t, block_file_t
   use restart_m, only: write_restart
-  use progress_m, only: progress_t, progress_start, line_interval, store_clips, write_line, &
-    write_summary
+  use progress_m, only: progress_t, line_interval
   implicit none
   private
   public :: output_t, name_folder, open_output, write_due_output, close_output
@@ -87,7 +85,7 @@ contains
       call close_files(output)
       call output%lock%release()
     end if
-    call progress_start(options%quiet, fluid, state%light%on, state%clock, output%progress)
+    call output%progress%start(options%quiet, fluid, state%light%on, state%clock)
     call toc(output%phase)
   end subroutine open_output
 
@@ -120,7 +118,7 @@ contains
     type(output_t), intent(inout) :: output
 
     associate (here => output%folder//'/')
-      call create_run_file(here//run_name, state, bed, output%run_file)
+      call output%run_file%begin(here//run_name, state, bed)
       if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', &
         'note', not_resolved)
       if (output%fields) call output%field_file%create(here//field_name, .true., state)
@@ -130,24 +128,10 @@ contains
     call watch_folder(output)
     if (output%code == exit_ok) return
     call close_files(output)
-    call discard(output, run_name)   ! no files that would look like results
-    call discard(output, field_name)
-    call discard(output, block_name)
+    call output%lock%remove(run_name)   ! no files that would look like results
+    call output%lock%remove(field_name)
+    call output%lock%remove(block_name)
   end subroutine create_files
-
-  !> Delete a file that could not be written, if the folder is still that of this run.
-  subroutine discard(output, name)
-    type(output_t), intent(inout) :: output
-    character(*), intent(in) :: name
-    character(:), allocatable :: message
-    integer :: code
-
-    if (.not. is_root()) return
-    code = exit_ok
-    message = ''
-    call output%lock%verify(code, message)
-    if (code == exit_ok) call output%lock%remove(name)
-  end subroutine discard
 
   !> Close all files, unless another run has taken the folder and them. All processes call.
   subroutine close_files(output, exit_code)
@@ -158,7 +142,7 @@ contains
     taken = output%lock%taken
     call broadcast(taken)
     if (taken) return
-    if (present(exit_code)) call close_run_file(output%run_file, exit_code)
+    if (present(exit_code)) call output%run_file%finish(exit_code)
     call output%run_file%file%close()
     call output%field_file%file%close()
     call output%block_file%file%close()
@@ -177,13 +161,13 @@ contains
     fluid = allocated(state%flow%u)
     blocks = state%blocks%n > 0
     associate (here => output%folder//'/', n => state%clock%frames%n, lock => output%lock)
-      call reopen_run_file(here//run_name, state, output%run_file)
+      call output%run_file%find(here//run_name, state)
       if (fluid .and. n > 0) call output%field_file%reopen(here//field_name, .true., n, state)
       if (blocks .and. n > 0) call output%block_file%reopen(here//block_name, .false., n, state)
       call check_files(output)
       call watch_folder(output)
       if (output%code /= exit_ok) return
-      call continue_run_file(state%blocks, output%run_file)
+      call output%run_file%go_on(state%blocks)
       if (fluid) call continue_frames(lock, here, field_name, output%fields, .true., state, &
                                       output%field_file)
       if (blocks) call continue_frames(lock, here, block_name, output%surfaces, .false., state, &
@@ -202,7 +186,7 @@ contains
   !> Go on with frames; without any so far the file begins now, and where no more are wanted it only
   !! loses the later ones.
   subroutine continue_frames(lock, here, name, wanted, shared, state, file)
-    type(folder_lock_t), intent(in) :: lock
+    type(folder_lock_t), intent(inout) :: lock
     character(*), intent(in) :: here, name   !! folder, file
     logical, intent(in) :: wanted            !! more frames
     logical, intent(in) :: shared            !! all processes write them
@@ -213,7 +197,7 @@ contains
       call file%drop(file%rows)
       if (.not. wanted) call file%file%close()
     else if (wanted) then
-      if (is_root()) call lock%remove(name)   ! a killed run may have left it
+      call lock%remove(name)   ! a killed run may have left it
       call file%create(here//name, shared, state)
     end if
   end subroutine continue_frames
@@ -259,7 +243,7 @@ contains
     if (output%code /= exit_ok) return
     call tic(output%phase)
     output%progress%warnings = output%progress%warnings + report%warnings
-    call store_clips(state%clock%t, report%inertia_clips, output%progress)
+    call output%progress%store_clips(state%clock%t, report%inertia_clips)
     row_wanted = state%clock%rows%due(state%clock%t) .and. output%row_step /= state%clock%step
     frame_wanted = state%clock%frames%due(state%clock%t) .and. output%frame_step /= state%clock%step
     now = wall_clock()
@@ -269,8 +253,7 @@ contains
     if (output%code /= exit_ok) return
     if (row_wanted .or. line_wanted) call set_row(state, report, output)
     call write_moment(row_wanted, frame_wanted, state, output)
-    if (line_wanted) call write_line(output%progress, state%clock, output%run_file%row, &
-      state%blocks)
+    if (line_wanted) call output%progress%line(state%clock, output%run_file%row, state%blocks)
     if (is_root() .and. now > output%next_look) then   ! rows may be far apart
       call output%lock%verify(output%code, output%message)
       output%next_look = now + look_interval
@@ -317,7 +300,7 @@ contains
     call tic(output%restart_phase)
     associate (name => restart_name(output%next_restart), lock => output%lock)
       part = name//'.part'
-      if (is_root()) call lock%remove(part)   ! of a run that was killed
+      call lock%remove(part)   ! of a run that was killed
       call write_restart(output%folder//'/'//part, output%run_file%text, &
         output%run_file%parameters, state, info, message)
       if (is_root() .and. info == 0) call lock%rename(part, name, info, message)
@@ -330,7 +313,7 @@ contains
     if (info == 0) return
     output%code = exit_files
     output%message = message
-    call discard(output, part)   ! the older files may need its room
+    call output%lock%remove(part)   ! the older files may need its room
   end subroutine save_state
 
   !> Write what a run must end with, its last row, frames and state, say how it ended, and close all
@@ -349,7 +332,7 @@ contains
                         state%clock%step, state, output)
     end if
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
-      call write_line(output%progress, state%clock, output%run_file%row, state%blocks)
+      call output%progress%line(state%clock, output%run_file%row, state%blocks)
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
@@ -357,8 +340,7 @@ contains
     call output%lock%release()
     call check_files(output)
     if (output%code /= exit_ok) code = output%code
-    call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
-                       output%folder)
+    call output%progress%summary(state%clock, product(int(state%grid%n, i8)), code, output%folder)
   end subroutine close_output
 
 end module output_m

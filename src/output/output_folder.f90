@@ -243,7 +243,7 @@ contains
   !! deleted.
   subroutine copy_file(from, name, lock, code, message)
     character(*), intent(in) :: from, name
-    type(folder_lock_t), intent(in) :: lock                !! of the folder
+    type(folder_lock_t), intent(inout) :: lock             !! of the folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
     character(:), allocatable :: bytes

@@ -12,7 +12,7 @@ module progress_m
   use diagnostics_m, only: quantity_t, value_of
   implicit none
   private
-  public :: progress_t, progress_start, store_clips, write_line, write_summary
+  public :: progress_t
 
   integer, parameter :: lines_per_header = 25
   real(wp), parameter, public :: line_interval = 1.0_wp   !! of wall time [s]
@@ -28,17 +28,19 @@ module progress_m
     real(wp) :: first_time = 0.0_wp       !! likewise [s]
     real(wp) :: began = 0.0_wp            !! wall clock at the start [s]
     real(wp) :: last_line = -huge(1.0_wp) !! wall clock at the last line [s]
+  contains
+    procedure :: start, store_clips, line => write_line, summary
   end type progress_t
 
 contains
 
   !> Begin to count time.
-  subroutine progress_start(quiet, fluid, light, clock, self)
+  subroutine start(self, quiet, fluid, light, clock)
+    class(progress_t), intent(out) :: self
     logical, intent(in) :: quiet
     logical, intent(in) :: fluid   !! there is one
     logical, intent(in) :: light   !! there is a water without flow
     type(clock_t), intent(in) :: clock
-    type(progress_t), intent(out) :: self
 
     self%shown = is_root() .and. .not. quiet
     self%fluid = fluid
@@ -48,13 +50,13 @@ contains
     if (light) call say(not_resolved, self)
     if (spins_for_long()) call say('threads spin while they wait: where other programs want the ' &
       //'cores, export GOMP_SPINCOUNT=1000 first, or take --threads 1', self)
-  end subroutine progress_start
+  end subroutine start
 
   !> Count what the limits of added inertia cut in a step, and warn of the first that do.
-  subroutine store_clips(time, clips, self)
+  subroutine store_clips(self, time, clips)
+    class(progress_t), intent(inout) :: self
     real(wp), intent(in) :: time    !! [s]
     integer, intent(in) :: clips    !! of the step
-    type(progress_t), intent(inout) :: self
 
     if (clips > 0 .and. self%clips == 0) then
       self%warnings = self%warnings + 1
@@ -70,7 +72,7 @@ contains
 
   !> Write one line, if this step has none yet; the header first where it is time for it.
   subroutine write_line(self, clock, row, blocks)
-    type(progress_t), intent(inout) :: self
+    class(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
     type(quantity_t), intent(in) :: row(:)
     type(blocks_t), intent(in) :: blocks
@@ -125,7 +127,7 @@ contains
   !> One line to whoever reads; nothing more once the reader has gone.
   subroutine say(line, self)
     character(*), intent(in) :: line
-    type(progress_t), intent(inout) :: self
+    class(progress_t), intent(inout) :: self
     integer :: info
 
     if (.not. self%shown) return
@@ -135,8 +137,8 @@ contains
   end subroutine say
 
   !> Say how the run went.
-  subroutine write_summary(self, clock, cells, exit_code, folder)
-    type(progress_t), intent(inout) :: self
+  subroutine summary(self, clock, cells, exit_code, folder)
+    class(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
     integer(i8), intent(in) :: cells   !! of the whole domain
     integer, intent(in) :: exit_code
@@ -160,6 +162,6 @@ contains
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
     call say('results in '//folder, self)
-  end subroutine write_summary
+  end subroutine summary
 
 end module progress_m

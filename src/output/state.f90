@@ -11,6 +11,7 @@ module state_m
   use kinds_m, only: wp, i8
   use parallel_m, only: global_sum
   use checksum_m, only: checksum_t
+  use run_groups_m, only: side_name
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
@@ -114,8 +115,6 @@ contains
     type(flow_t), intent(in), target :: flow
     type(solid_geometry_t), intent(in), target :: solid
     type(state_list_t), intent(inout) :: list
-    character(5), parameter :: side(2, 3) = reshape(['x_min', 'x_max', 'y_min', 'y_max', 'z_min', &
-                                                     'z_max'], [2, 3])
     integer :: s, d
 
     call list%add('/flow/u', 'm/s', flow%u, on_faces=.false.)
@@ -132,7 +131,7 @@ contains
     do d = 1, 3   ! of each outflow the velocity that follows slowly
       do s = 1, 2
         if (flow%sides(s, d)%active) then
-          call list%add('/flow/outflow_'//side(s, d), 'm/s', flow%sides(s, d)%mean)
+          call list%add('/flow/outflow_'//side_name(s, d), 'm/s', flow%sides(s, d)%mean)
         end if
       end do
     end do

@@ -17,7 +17,7 @@ module write_run_m
   use diagnostics_m, only: quantity_t
   implicit none
   private
-  public :: run_file_t, create_run_file, reopen_run_file, continue_run_file, close_run_file
+  public :: run_file_t
 
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
     'exit_time', 'raised', 'impact_speed', 'rest_since', 'status']   !! datasets, a number per block
@@ -34,16 +34,17 @@ module write_run_m
   contains
     procedure :: write_head
     procedure :: list_columns
+    procedure :: begin => begin_run, find => find_run, go_on, finish
   end type run_file_t
 
 contains
 
   !> Create the file with everything but rows; `self` has the case and a row.
-  subroutine create_run_file(path, state, bed, self)
+  subroutine begin_run(self, path, state, bed)
+    class(run_file_t), intent(inout) :: self
     character(*), intent(in) :: path
     type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
-    type(run_file_t), intent(inout) :: self
 
     call self%create(path, .false., state)
     if (.not. (is_root() .and. bed%there)) return
@@ -53,7 +54,7 @@ contains
     call self%file%store('/bed/triangles', '1', [real(bed%triangle - 1, wp)], &
       shape(bed%triangle), as_integer)
     call self%file%flush()
-  end subroutine create_run_file
+  end subroutine begin_run
 
   !> How the run was made, its grid, shapes and blocks.
   subroutine write_head(self, state)
@@ -185,10 +186,10 @@ contains
   end subroutine store_once
 
   !> Open the file of a run that goes on; nothing in it is changed yet.
-  subroutine reopen_run_file(path, state, self)
+  subroutine find_run(self, path, state)
+    class(run_file_t), intent(inout) :: self
     character(*), intent(in) :: path
     type(run_state_t), intent(in) :: state
-    type(run_file_t), intent(inout) :: self
     real(wp) :: wall_time(1), q(4*state%blocks%n)
 
     self%q = state%blocks%q
@@ -201,12 +202,12 @@ contains
     call self%file%read('/series/wall_time', wall_time, [self%rows], [1])
     self%q = reshape(q, [4, state%blocks%n])
     self%wall_time = wall_time(1)
-  end subroutine reopen_run_file
+  end subroutine find_run
 
   !> Drop the rows later than the start of a run that goes on, and say that it does.
-  subroutine continue_run_file(blocks, self)
+  subroutine go_on(self, blocks)
+    class(run_file_t), intent(inout) :: self
     type(blocks_t), intent(in) :: blocks
-    type(run_file_t), intent(inout) :: self
 
     if (.not. is_root()) return
     associate (file => self%file)
@@ -220,11 +221,11 @@ contains
       call file%attribute('/provenance', 'exit_status', [running])
       call file%flush()
     end associate
-  end subroutine continue_run_file
+  end subroutine go_on
 
   !> Write the times of the phases, how the run ended and when; close the file.
-  subroutine close_run_file(self, exit_status)
-    type(run_file_t), intent(inout) :: self
+  subroutine finish(self, exit_status)
+    class(run_file_t), intent(inout) :: self
     integer, intent(in) :: exit_status
 
     if (.not. is_root()) return
@@ -240,6 +241,6 @@ contains
         file%info == 0))
       call file%close()
     end associate
-  end subroutine close_run_file
+  end subroutine finish
 
 end module write_run_m

@@ -18,7 +18,7 @@ module set_up_file_m
   use state_m, only: run_state_t
   use diagnostics_m, only: step_report_t, make_row
   use hdf5_file_m, only: as_integer
-  use write_run_m, only: run_file_t, create_run_file, close_run_file
+  use write_run_m, only: run_file_t
   implicit none
   private
   public :: write_set_up
@@ -47,7 +47,7 @@ contains
     file%text = case%text
     file%parameters = parameters
     file%row = make_row(case%fluid, 0.0_wp, state, report)
-    call create_run_file(path, state, bed, file)
+    call file%begin(path, state, bed)
     call write_places(case, state%blocks, file)
     state%blocks%present = state%blocks%fixed .and. are_driven(state%blocks)   ! only they move
     do i = 0, merge(n_poses, 0, any(state%blocks%present))
@@ -56,7 +56,7 @@ contains
       call drift(case%run%t_end/n_poses, state%blocks)
       state%clock%t = (i + 1)*case%run%t_end/n_poses
     end do
-    call close_run_file(file, exit_ok)
+    call file%finish(exit_ok)
     message = ''
     if (file%file%info /= 0) message = file%file%message
   end subroutine write_set_up
