@@ -126,7 +126,8 @@ contains
         call toc(sim%timer_velocity)
       end if
     end associate
-    call sim%clock%advance()
+    sim%clock%t = sim%clock%t_next
+    sim%clock%step = sim%clock%step + 1
     call describe(sim, report)
     report%overlap_known = .false.
     if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then

@@ -30,7 +30,7 @@ module clock_m
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
     type(run_t) :: run              !! intervals, end, the rule for settling
   contains
-    procedure :: choose_step, advance, finished, settled
+    procedure :: choose_step, finished, settled
   end type clock_t
 
 contains
@@ -110,14 +110,6 @@ contains
       self%t_next = self%t + self%dt
     end if
   end subroutine choose_step
-
-  !> The step is done.
-  pure subroutine advance(self)
-    class(clock_t), intent(inout) :: self
-
-    self%t = self%t_next
-    self%step = self%step + 1
-  end subroutine advance
 
   !> Has the run reached its end, or settled?
   pure function finished(self) result(yes)

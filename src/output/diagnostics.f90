@@ -59,10 +59,7 @@ contains
     type(run_state_t), intent(in) :: state
     type(step_report_t), intent(in) :: report
     type(quantity_t), allocatable :: row(:)
-    real(wp) :: kinetic, potential
 
-    kinetic = kinetic_energy(state%blocks)
-    potential = potential_energy(fluid%gravity, state%blocks)
     row = [ &
       quantity_t('time', 's', state%clock%t), &
       quantity_t('dt', 's', state%clock%dt), &
@@ -74,9 +71,9 @@ contains
       quantity_t('liquid_volume_drift', '1', wet(drift())), &
       quantity_t('volume_excess_max', '1', wet(report%fluid%excess_max)), &
       quantity_t('kinetic_energy_fluid', 'J', wet(report%fluid%kinetic)), &
-      quantity_t('kinetic_energy_bodies', 'J', kinetic), &
+      quantity_t('kinetic_energy_bodies', 'J', kinetic_energy(state%blocks)), &
       quantity_t('potential_energy_fluid', 'J', wet(report%fluid%potential)), &
-      quantity_t('potential_energy_bodies', 'J', potential), &
+      quantity_t('potential_energy_bodies', 'J', potential_energy(fluid%gravity, state%blocks)), &
       quantity_t('contact_energy', 'J', report%contact%energy), &
       quantity_t('energy_excess', '1', wet(report%energy_excess)), &
       quantity_t('max_overlap', 'm', report%max_overlap), &
