@@ -64,6 +64,8 @@ contains
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     type(light_t), intent(out) :: light
+    real(wp), parameter :: slice = 1.0e-3_wp   ! of the height of the tank
+    real(wp) :: low(3), high(3), thickness
     integer :: s, b
 
     light%on = .true.
@@ -72,7 +74,20 @@ contains
     light%level_start = case%fluid%water_level
     light%level = light%level_start
     light%bottom = case%grid%origin(3)
-    light%area = free_area(case, bed)
+    ! Area of the surface of the water, without what of the bed stands out of it [m2]. Zero where
+    ! water finds a way out through a side: the sea outside keeps the level.
+    if (.not. any(gives_pressure([side_code(case%boundary%kind(:, 1:2))]))) then
+      light%area = product(case%grid%length(1:2))
+      if (bed%there) then
+        low = case%grid%origin
+        high = low + case%grid%length
+        thickness = slice*case%grid%length(3)
+        high(3) = case%fluid%water_level + 0.5_wp*thickness
+        light%area = light%area - bed_volume(bed, low, high)/thickness
+        high(3) = high(3) - thickness
+        light%area = light%area + bed_volume(bed, low, high)/thickness
+      end if
+    end if
     light%drag = case%shape%drag_coefficient
     allocate (light%facets(size(blocks%shapes)), light%added(size(blocks%shapes)), &
       light%inverse(3, 3, size(blocks%shapes)))
@@ -120,28 +135,6 @@ contains
                             sum([(shape%inertia(d, d), d=1, 3)])/shape%density)
     end if
   end function added_inertia_of
-
-  !> Area of the surface of the water, without what of the bed stands out of it [m2]. Zero where
-  !! water finds a way out through a side: the sea outside keeps the level.
-  function free_area(case, bed) result(area)
-    type(case_t), intent(in) :: case
-    type(bed_t), intent(in) :: bed
-    real(wp) :: area
-    real(wp), parameter :: slice = 1.0e-3_wp   ! of the height of the tank
-    real(wp) :: low(3), high(3), thickness
-
-    area = 0.0_wp
-    if (any(gives_pressure([side_code(case%boundary%kind(:, 1:2))]))) return
-    area = product(case%grid%length(1:2))
-    if (.not. bed%there) return
-    low = case%grid%origin
-    high = low + case%grid%length
-    thickness = slice*case%grid%length(3)
-    high(3) = case%fluid%water_level + 0.5_wp*thickness
-    area = area - bed_volume(bed, low, high)/thickness
-    high(3) = high(3) - thickness
-    area = area + bed_volume(bed, low, high)/thickness
-  end function free_area
 
   !> Longest step: no block moves by more than `way_max` smallest edges in it [s].
   pure function step_in_water(gravity, blocks, light) result(dt)

@@ -365,7 +365,8 @@ contains
   subroutine sum_by_part(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
-    integer :: c, l, n
+    integer :: c, l, n, d, s, f(3)
+    logical :: at_side
 
     n = self%parts
     self%vents(1:n) = 0_i8
@@ -373,7 +374,15 @@ contains
       do c = 1, n
         associate (a => self%first(c), b => self%first(c + 1) - 1)
           do l = a, b
-            if (at_open_side(self%cell(:, l))) self%vents(c) = self%vents(c) + 1_i8
+            at_side = .false.   ! can it exchange through an open side of the domain?
+            do d = 1, 3
+              do s = 0, 1
+                f = self%cell(:, l) + s*unit_step(:, d)
+                if (grid%side_of_face(f(d), d) == no_side) cycle
+                at_side = at_side .or. self%k(f(1), f(2), f(3), d) > 0.0_wp
+              end do
+            end do
+            if (at_side) self%vents(c) = self%vents(c) + 1_i8
           end do
           accumulator(:, c) = no_terms
           accumulator(:, n + c) = no_terms
@@ -384,21 +393,6 @@ contains
       call global_sum(self%vents(1:n))
       call exact_totals(accumulator(:, 1:2*n), self%total(1:2*n))
     end associate
-  contains
-    !> Can this cell exchange through an open side of the domain?
-    logical function at_open_side(c)
-      integer, intent(in) :: c(3)
-      integer :: d, s, f(3)
-
-      at_open_side = .false.
-      do d = 1, 3
-        do s = 0, 1
-          f = c + s*unit_step(:, d)
-          if (grid%side_of_face(f(d), d) == no_side) cycle
-          if (self%k(f(1), f(2), f(3), d) > 0.0_wp) at_open_side = .true.
-        end do
-      end do
-    end function at_open_side
   end subroutine sum_by_part
 
   !> Take a part out of the system: its faces conduct nothing.

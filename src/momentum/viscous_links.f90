@@ -216,6 +216,7 @@ contains
       integer, intent(in) :: n, c(3), d, sense, body
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: x_wall(3), t, viscosity
+      real(wp) :: at_centre   ! velocity there over the mean
       integer :: a
 
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
@@ -226,28 +227,20 @@ contains
       end do
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
       viscosity = mu(c(1), c(2), c(3))
-      if (present(merged)) viscosity = max(viscosity, viscosity_at_wall(n, c))
+      if (present(merged)) then   ! that of a rough layer; a fluid without viscosity slips
+        if (viscosity > 0.0_wp .and. merged%wall_speed(n) > 0.0_wp) then
+          at_centre = 1.0_wp
+          if (merged%number(c(1), c(2), c(3)) > 0) at_centre = &
+            merged%centre(merged%number(c(1), c(2), c(3)))
+          viscosity = max(viscosity, rough_viscosity(rho(c(1), c(2), c(3)), &
+            at_centre*merged%wall_speed(n), distance_of_links(grid, solid, c), spacing))
+        end if
+      end if
       self%walls%found_cell(:, n) = c
       self%walls%found_body(n) = body
       self%walls%found_k(n) = viscosity*grid%area(d)/(grid%h(d)*t)
       self%walls%found_arm(:, n) = nearest_arm(grid, x_wall, bodies%x(:, body))
     end subroutine wall_link
-
-    !> That of a rough layer, for link n of cell c [Pa s]. A fluid without viscosity slips.
-    pure function viscosity_at_wall(n, c) result(mu_w)
-      integer, intent(in) :: n, c(3)
-      real(wp) :: mu_w
-      real(wp) :: at_centre   ! velocity there over the mean
-
-      mu_w = 0.0_wp
-      if (mu(c(1), c(2), c(3)) <= 0.0_wp .or. merged%wall_speed(n) <= 0.0_wp) return
-      at_centre = 1.0_wp
-      associate (m => merged%number(c(1), c(2), c(3)))
-        if (m > 0) at_centre = merged%centre(m)
-      end associate
-      mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*merged%wall_speed(n), &
-                             distance_of_links(grid, solid, c), spacing)
-    end function viscosity_at_wall
   end subroutine links_to_bodies
 
   !> Half a link in direction d to a wall of the domain or to an inflow, which pulls the cell
