@@ -55,7 +55,7 @@ def faults(found: Imports) -> list[str]:
     """What is against the order of the packages, a line each, and the first circle among files."""
     lines = [
         f"{package}: no such package in packages.toml"
-        for package in sorted(_packages(found) - HEIGHT.keys())
+        for package in sorted({package_of(file) for file in found} - HEIGHT.keys())
     ]
     for file, used in sorted(found.items()):
         for other in sorted(used):
@@ -77,10 +77,6 @@ def arrows(found: Imports) -> Counter[tuple[str, str]]:
         (package_of(file), package_of(other)) for file, used in found.items() for other in used
     )
     return Counter(pair for pair in pairs if pair[0] != pair[1])
-
-
-def _packages(found: Imports) -> set[str]:
-    return {package_of(file) for file in found}
 
 
 BANDS, BOXES, CONTENT, COLOURS = (DATA[name] for name in ("bands", "boxes", "content", "colours"))

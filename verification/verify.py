@@ -115,10 +115,6 @@ class Progress:
                     for process in self.running.values():
                         process.terminate()
 
-    def time_is_up(self) -> bool:
-        """No more runs shall start."""
-        return time.monotonic() > self.deadline
-
 
 def compute(plan: Planned, key: str, progress: Progress) -> Finished:
     """Run a case file, or go on with it, or keep what is there."""
@@ -131,7 +127,7 @@ def compute(plan: Planned, key: str, progress: Progress) -> Finished:
     if finished.ended == "code 0":
         progress.done += 1
         return finished
-    if progress.time_is_up():
+    if time.monotonic() > progress.deadline:
         return Finished(plan.name, str(folder), finished.seconds, finished.ended or "not run")
     newest = sorted(folder.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)[-1:]
     if before and newest:

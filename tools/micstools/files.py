@@ -23,8 +23,9 @@ def write(path: Path, text: str) -> None:
         place.write_bytes(content)
         return
     new = place.with_name(f".mics-{secrets.token_hex(8)}")
+    mode = stat.S_IMODE(old.st_mode) if old else 0o666
     try:
-        with open(new, "xb", opener=lambda name, flags: os.open(name, flags, _mode(old))) as file:  # noqa: PTH123 - for its opener
+        with open(new, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:  # noqa: PTH123 - for its opener
             _put(file, content)
         if old is None or _stands_for(new, place, old):
             new.replace(place)
@@ -64,10 +65,6 @@ def write_table(path: Path, rows: Sequence[dict[str, object]]) -> Path:
     """Write rows with the same names as CSV."""
     write(path, table_text(rows, list(rows[0])))
     return path
-
-
-def _mode(old: os.stat_result | None) -> int:
-    return stat.S_IMODE(old.st_mode) if old else 0o666
 
 
 def _put(file: BinaryIO, content: bytes) -> None:

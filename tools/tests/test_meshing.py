@@ -125,11 +125,6 @@ def test_a_surface_that_is_far_from_closed_is_refused(tmp_path: Path) -> None:
         meshing.load(save(mesh, tmp_path / "open.stl"))
 
 
-def ascii_stl() -> str:
-    """The hexapod as text."""
-    return str(trimesh.exchange.stl.export_stl_ascii(hexapod_surface()))
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -141,7 +136,8 @@ def ascii_stl() -> str:
     ids=["capitals", "ENDSOLID", "end solid", "byte-order mark"],
 )
 def test_an_stl_of_any_writing_is_read(tmp_path: Path, change: Callable[[str], str]) -> None:
-    (tmp_path / "a.stl").write_text(change(ascii_stl()), encoding="utf-8")
+    text = str(hexapod_surface().export(file_type="stl_ascii"))
+    (tmp_path / "a.stl").write_text(change(text), encoding="utf-8")
     assert meshing.load(tmp_path / "a.stl").volume == pytest.approx(7 * D**3, rel=1e-6)
 
 

@@ -30,16 +30,12 @@ TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"
 CLEAR = np.array([0.2, 0.05, 0.12])  # of the other blocks [m]
 
 
-def retitle(folder: Path, title: str) -> Path:
-    """Gives a synthetic run another title."""
-    written = '"' + title.replace('"', '""') + '"'
-    return reword(folder, lambda text: text.replace("'synthetic'", written)).folder
-
-
 @pytest.fixture(scope="session")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of a synthetic run with a title that looks like markup."""
-    folder = retitle(write_run(tmp_path_factory.mktemp("page") / "run"), TITLE)
+    folder = write_run(tmp_path_factory.mktemp("page") / "run")
+    written = '"' + TITLE.replace('"', '""') + '"'
+    reword(folder, lambda text: text.replace("'synthetic'", written))
     assert mics_tools(["report", str(folder)]) == 0
     return folder / "report.html"
 

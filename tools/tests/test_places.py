@@ -23,7 +23,7 @@ from micstools.shapes import height_maps
 from micstools.shapes import shape as shapes
 from micstools.shapes.geometry import Array, quaternion_from_axis, quaternion_product
 from synthetic import UPRIGHT, Motion, with_bed, write_run
-from test_pile_ensemble import write_ensemble
+from test_pile_ensemble import cube_run, write_ensemble
 
 EDGE, HALF = 0.02, 0.01
 X, Y, Z = np.eye(3)
@@ -291,18 +291,10 @@ def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:
 RADIUS = EDGE / 4  # of a ball of the diameter D_n/2
 
 
-def cubes(folder: Path, places: list[tuple[float, float, float]], edge: float = EDGE) -> Run:
+def cubes(folder: Path, places: list[tuple[float, float, float]]) -> Run:
     """A run that ends with cubes at some places; the fixed blocks of the synthetic run are never
     let go."""
-    motion = Motion(
-        shape=shapes.cube(edge),
-        places=[(np.array(place), UPRIGHT) for place in places],
-        t_end=len(places) + 1.0,
-        history_step=0.5,
-        field_step=100.0,
-        cells=(6, 2, 4),
-    )
-    write_run(folder / "run", motion)
+    write_run(folder / "run", cube_run(places))
     with h5py.File(folder / "run" / "run.h5", "r+") as h5:
         h5["bodies/release_time"][:3] = 1e9
     return Run(folder / "run")

@@ -11,9 +11,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+from micstools.reading.reader import Run
 from run_cases import ROOT, Machine
 from run_soak import Given
 from soak.shop import Shop, column, restart_files, start
@@ -28,16 +28,6 @@ def machine(text: str) -> Machine:
     """RxT: so many processes of so many threads."""
     ranks, threads = map(int, text.split("x"))
     return Machine(ROOT / "mics_mpi", ranks, threads)
-
-
-def contact_times(folder: Path) -> np.ndarray:
-    """Times of rows in which a free block touches something and moves."""
-    with h5py.File(folder / "run.h5", "r", locking=False) as h5:
-        bodies = h5["bodies"]
-        free = ~np.asarray(bodies["fixed"][:], bool)
-        speed = np.linalg.norm(bodies["velocity"][:], axis=2)
-        touching = (bodies["contacts"][:] > 0) & (speed > MOVING) & free
-        return np.asarray(bodies["time"][:][touching.any(axis=1)])
 
 
 def stopped(
@@ -68,7 +58,10 @@ def try_case(
     for text in numbers:
         start(machine(text), "--output", work / text, case).communicate()
         yield f"{case.name} {text}", shop.unlike(work / text)
-    times = contact_times(shop.whole)
+    # Rows in which a free block touches something and moves
+    b = Run(shop.whole).bodies
+    moving = np.linalg.norm(b.velocity, axis=2) > MOVING
+    times = b.time[((b.contacts > 0) & moving & ~b.fixed).any(axis=1)]
     for i in range(stops):
         on, then = numbers[-1 - i % len(numbers)], numbers[i % len(numbers)]
         until, folder = float(times[(i + 1) * len(times) // (stops + 1)]), work / f"stop-{i}"

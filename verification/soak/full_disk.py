@@ -40,10 +40,6 @@ def small_disk(size: int, at: Path) -> Iterator[None]:
         subprocess.run(["umount", str(at)], check=True)
 
 
-def enlarge(at: Path) -> None:
-    subprocess.run(["mount", "-o", "remount,size=64m", str(at)], check=True)
-
-
 def may_mount() -> bool:
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -77,7 +73,8 @@ def check_size(shop: Shop, kind: str, size: int, work: Path) -> tuple[str, list[
             if not damaged and exit_status(output) not in (None, code):
                 found.append(f"run.h5 says exit status {exit_status(output)} of {code}")
             if kind == "disk":
-                enlarge(room)
+                bigger = ["mount", "-o", "remount,size=64m", str(room)]
+                subprocess.run(bigger, check=True)
             found += goes_on(shop, output, spare)
         return f"exit {code} {' '.join(said.split())}".replace(str(output) + "/", ""), found
 

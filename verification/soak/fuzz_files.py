@@ -353,17 +353,12 @@ def run(program: Path, arguments: list[str], folder: Path) -> tuple[int, str]:
     return done.returncode, done.stderr.decode("utf-8", "replace")
 
 
-def untabbed(row: str) -> str:
-    """A line without tabs, which may stand in a text."""
-    return row.replace("\t", " ")
-
-
 def fault_of(code: int, errors: str, allowed: tuple[int, ...]) -> str:
     """What is wrong with the way the program ended; empty if nothing is."""
-    rows = errors.splitlines()
+    rows = errors.replace("\t", " ").splitlines()  # a tab may stand in a text
     if code not in allowed:
         return f"ended with {code}: {errors[:2000]}"
-    foreign = [row for row in rows if not row.startswith(OWN) or not untabbed(row).isprintable()]
+    foreign = [row for row in rows if not row.startswith(OWN) or not row.isprintable()]
     if foreign:
         return f"not a message of the program: {foreign[0][:300]!r}"
     if code != TAKEN and not rows:
@@ -391,10 +386,7 @@ def try_file(kind: Kind, data: bytes, program: Path) -> tuple[int, str]:
 
 def trials(given: Given, work: Path) -> Iterator[tuple[str, list[str]]]:
     """A line for each kind: how its files ended."""
-    program, keep = (
-        given.program or (SAN if SAN.exists() else ROOT / "mics"),
-        ROOT / "build" / "fuzz",
-    )
+    program, keep = given.program or (SAN if SAN.exists() else ROOT / "mics"), ROOT / "build/fuzz"
     for name in given.words or KINDS:
         kind, ends, faults = KINDS[name], Counter[str](), []
         for i in range(given.n or kind.count):

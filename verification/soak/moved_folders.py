@@ -39,14 +39,6 @@ def elsewhere(work: Path) -> dict[str, str]:
     return {**os.environ, **MPI_SETTINGS, "LD_PRELOAD": str(library)}
 
 
-def second_run(shop: Shop, way: str, folder: Path, work: Path) -> subprocess.Popen[str]:
-    """Begin the second run, where the way has one."""
-    words = ["--output", folder]
-    if way == "unseen in place":
-        words = ["--restart", folder / "restart-a.h5"]
-    return shop.start(*words, **({"env": elsewhere(work)} if way.startswith("unseen") else {}))
-
-
 def begun(folder: Path, work: Path, way: str) -> bool:
     """Has the second run its files, or what there is of the first?"""
     if way == "unseen in place":
@@ -65,13 +57,6 @@ def wrong_results(whole: Path, folder: Path, way: str) -> list[str]:
     except (OSError, RuntimeError, KeyError) as trouble:
         return [f"a file cannot be read: {trouble}"]
     return but_restarts(found) if way == "unseen in place" else found
-
-
-def wrong_end(code: int, said: str, folder: Path, early: bool) -> list[str]:
-    """What is wrong with the end of the first run; one that is not early may be done already."""
-    lines = [line for line in said.splitlines() if line.startswith("mics: ")]
-    well = code == 4 and len(lines) == 1 and str(folder) in lines[0]
-    return [] if well or (code == 0 and not early) else [f"the first: exit code {code}: {said}"]
 
 
 def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[str]]:
@@ -97,13 +82,20 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
         folder.rename(kept)
     if way == "emptied":
         folder.mkdir()
-    second = second_run(shop, way, folder, work) if way in SECOND else None
+    second, in_place = None, way == "unseen in place"
+    if way in SECOND:
+        words = ["--restart", folder / "restart-a.h5"] if in_place else ["--output", folder]
+        node = {"env": elsewhere(work)} if way.startswith("unseen") else {}
+        second = shop.start(*words, **node)
     while second and second.poll() is None and not begun(folder, work, way):
         time.sleep(0.001)
     for pid in still:
         os.kill(pid, signal.SIGCONT)
     said = first.communicate(timeout=120)[1]
-    found = wrong_end(first.returncode, said, folder, rows < whole - 2)
+    lines = [line for line in said.splitlines() if line.startswith("mics: ")]
+    well = first.returncode == 4 and len(lines) == 1 and str(folder) in lines[0]
+    done = first.returncode == 0 and rows >= whole - 2
+    found = [] if well or done else [f"the first: exit code {first.returncode}: {said}"]
     if second is not None:
         end = second.communicate(timeout=120)[1]
         found += [] if second.returncode == 0 else [f"the second: {end.strip()}"]

@@ -40,17 +40,6 @@ SECONDS = 20.0  # to end in
 PATIENT = ("env", "OMPI_MCA_odls_base_sigkill_timeout=5")
 
 
-def last_step_is_saved(folder: Path) -> list[str]:
-    """Does a restart file hold the last row, and do the results say how the run ended?"""
-    times = []
-    for path in folder.glob("restart-?.h5"):
-        with h5py.File(path, "r") as h5:
-            times.append(float(h5["clock/t"][0]))
-    last = float(column(folder, "series/time")[-1])
-    found = [] if last in times else [f"the last row is of {last} s, restart files of {times}"]
-    return found + ([] if exit_status(folder) is not None else ["no exit status"])
-
-
 def trial(
     shop: Shop, number: int, seconds: float, patient: bool, work: Path
 ) -> tuple[str, list[str]]:
@@ -79,7 +68,14 @@ def trial(
         return said + ", left no restart file", found + begins_again(shop, folder)
     found += wrong_files(shop, folder, extra=int(number != signal.SIGKILL))
     if not found and number != signal.SIGKILL:
-        found += last_step_is_saved(folder)
+        times = []
+        for path in folder.glob("restart-?.h5"):
+            with h5py.File(path, "r") as h5:
+                times.append(float(h5["clock/t"][0]))
+        last = float(column(folder, "series/time")[-1])
+        if last not in times:
+            found.append(f"the last row is of {last} s, restart files of {times}")
+        found += [] if exit_status(folder) is not None else ["no exit status"]
     return said, found or goes_on(shop, folder, spare)
 
 

@@ -64,16 +64,12 @@ def drops(world: World, folder: Path) -> None:
     thrice, each = [], []
     for name, group in world.groups:
         thrice.append((name, {**group, "count": 3} if name == "drop" else group))
-        times = range(3 if name == "drop" else 1)
-        each += [(name, _later(group, k) if k else group) for k in times]
+        start, interval = group.get("first_time", 0.0), group.get("interval", 1.0)
+        later = [{**group, "first_time": start + k * interval} for k in (1, 2)]
+        each += [(name, one) for one in [group, *(later if name == "drop" else [])]]
     one = replace(world, groups=[(n, _exact(g)) for n, g in thrice]).run(folder / "one")
     other = replace(world, groups=[(n, _exact(g)) for n, g in each]).run(folder / "other")
     same(one.folder, other.folder, "&drop count = 3 or three groups")
-
-
-def _later(group: Group, k: int) -> Group:
-    start = group.get("first_time", 0.0)
-    return {**group, "first_time": start + k * group.get("interval", 1.0)}
 
 
 def _exact(group: Group) -> Group:

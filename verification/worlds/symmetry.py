@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.shapes.geometry import Array
+from micstools.shapes.geometry import Array, quaternion_product
 from worlds.world import Broken, Group, World
 
 FEW = 3  # steps in which round-off has not grown
@@ -46,7 +46,8 @@ def changed(world: World, q: Array) -> World:
     def attitude(a: list[float]) -> list[float]:
         if det < 0:
             return [a[0], *(det * q @ a[1:])]
-        return product(turn_of(q), a)
+        turned = np.array(TURNS["QUARTER" if (q == QUARTER).all() else "AXES"])
+        return list(quaternion_product(turned, np.array(a)))
 
     def change(name: str, group: Group) -> Group:
         group = dict(group)
@@ -77,17 +78,6 @@ def side(q: Array, name: str) -> str:
     if q[to, d] < 0:
         end = {"min": "max", "max": "min"}[end]
     return f"{'xyz'[to]}_{end}"
-
-
-def turn_of(q: Array) -> list[float]:
-    """The quaternion of a turn."""
-    return TURNS["QUARTER" if (q == QUARTER).all() else "AXES"]
-
-
-def product(a: list[float], b: list[float]) -> list[float]:
-    """Rotation b followed by rotation a."""
-    v, w = np.array(a[1:]), np.array(b[1:])
-    return [a[0] * b[0] - v @ w, *(a[0] * w + b[0] * v + np.cross(v, w))]
 
 
 def same(

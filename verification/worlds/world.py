@@ -2,9 +2,7 @@
 
 import csv
 import io
-import os
 import re
-import subprocess
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +13,8 @@ import numpy as np
 
 from micstools.cases.case import schema
 from micstools.reading.reader import Run
-from run_cases import MPI_SETTINGS, Machine
+from run_cases import Machine
+from shared_runs import call
 
 Group = dict[str, Any]
 Table = tuple[dict[str, str], list[list[Any]]]
@@ -129,28 +128,14 @@ class World:
         self, folder: Path, *words: str, machine: Machine = ALONE, ends: tuple[int, ...] = (0, 3)
     ) -> Run:
         """Run it in a new folder: its results. A case that is refused is no world."""
-        done = run_case(self.write(folder), folder / "out", *words, machine=machine)
+        command = (*machine.command, "--output", folder / "out", *words, self.write(folder))
+        done = call(*command, more={"OMP_WAIT_POLICY": "passive"}, timeout=600)
         if done.returncode == REFUSED:
             hypothesis.reject()
         last = done.stderr.strip().splitlines()[-1:]
         if done.returncode not in ends and "found room" not in str(last):
             raise Broken(f"exit code {done.returncode}: {last}")
         return Run(folder / "out")
-
-
-def run_case(
-    case: Path, out: Path, *words: str, machine: Machine = ALONE
-) -> subprocess.CompletedProcess[str]:
-    """Run the program with results in a folder."""
-    return subprocess.run(
-        [*machine.command, "--output", str(out), *words, str(case)],
-        env={**os.environ, **MPI_SETTINGS, "OMP_WAIT_POLICY": "passive"},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
 
 
 def _plus(values: list[float], by: list[float]) -> list[float]:

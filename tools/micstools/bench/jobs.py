@@ -12,7 +12,6 @@ from micstools.bench.timing import Timing, mpirun, timed
 from micstools.cases import settings
 from micstools.ensembles.ensemble import NO_ROOM
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import Array
 
 INPUT = Path(__file__).parents[3] / "input"
 _NOT_STEPPING = ("output", "restart files")
@@ -101,9 +100,3 @@ def pile(n: int, seconds: float, program: Path, threads: int, folder: Path, **ca
     words = [program, "--quiet", "--threads", threads, path]
     wall, cpu, memory = timed(words, folder)
     return Timing(wall, cpu, memory, seconds, int(Run(output).series.substeps.sum()), n)
-
-
-def last_places(folder: Path) -> tuple[Array, Array]:
-    """Where the blocks of the pile in a folder ended: positions (n, 3) [m], quaternions (n, 4)."""
-    bodies = Run(folder / "result").bodies
-    return bodies.position[-1], bodies.quaternion[-1]

@@ -11,6 +11,7 @@ from typing import Any
 from micstools.bench import dry_pile, jobs
 from micstools.bench.jobs import Job
 from micstools.bench.timing import Timing
+from micstools.reading.reader import Run
 
 Row = dict[str, Any]
 KEYS = ("part", "job", "threads", "ranks", "size")
@@ -71,8 +72,10 @@ def growth(means: Means) -> Iterator[Row]:
 def _pile(part: str, n: int, seconds: float, threads: int, repeat: int, means: Means) -> Row:
     def work(folder: Path) -> tuple[Timing, float]:
         timing = jobs.pile(n, seconds, means.programs[0], threads, folder)
-        last = jobs.last_places(folder) if part == "jobs" else None
-        return timing, 1e3 * dry_pile.true_depth(*last) if last else float("nan")
+        if part != "jobs":
+            return timing, float("nan")
+        end = Run(folder / "result").bodies
+        return timing, 1e3 * dry_pile.true_depth(end.position[-1], end.quaternion[-1])
 
     runs = [_fresh(work) for _ in range(repeat)]
     found = row(part, "pile", [timing for timing, _ in runs], threads=threads)

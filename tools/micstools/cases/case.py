@@ -34,10 +34,6 @@ if TYPE_CHECKING:
 _OUTPUT = "mics-out"
 
 
-def _repeated(group: str) -> bool:
-    return "anyOf" in schema()["properties"][group]
-
-
 def _near(name: str, known: Iterable[str]) -> str:
     """The nearest known name, in words."""
     found = difflib.get_close_matches(name, list(known), 1)
@@ -170,8 +166,8 @@ class Case:
         self._pieces: list[tuple[str, str, Group | None]] = []  # before, text, group
         self._groups: dict[str, Group | Groups] = {}
         places = settings.groups(text)
-        for name in schema()["properties"]:
-            self._groups[name] = Groups(name) if _repeated(name) else group_class(name)()
+        for name, about in schema()["properties"].items():
+            self._groups[name] = Groups(name) if "anyOf" in about else group_class(name)()
         end, seen = 0, set()
         for name, start, stop in places:
             if name not in self._groups:

@@ -50,16 +50,11 @@ def case_text(case: Path, words: list[str]) -> str:
         wanted = [settings.parse(word) for word in words]
         text = settings.set_variables(text, wanted)
         if any(setting.name == "drop.seed" for setting in wanted):
-            _tell_seeds(text)
+            drops = sum(name == "drop" for name, _, _ in settings.groups(text))
+            seeds = ", ".join(str(settings.value(text, "drop", "seed", n)) for n in range(drops))
+            if drops > 1:
+                print(f"&drop seed = {seeds}: one for each of the {drops} groups", file=sys.stderr)
     return case_copy.from_here(text, case.parent)
-
-
-def _tell_seeds(text: str) -> None:
-    """Name the seeds of several &drop on standard error."""
-    drops = sum(name == "drop" for name, _, _ in settings.groups(text))
-    if drops > 1:
-        seeds = ", ".join(str(settings.value(text, "drop", "seed", n)) for n in range(drops))
-        print(f"&drop seed = {seeds}: one for each of the {drops} groups", file=sys.stderr)
 
 
 def check(program: Path, text: str) -> str:

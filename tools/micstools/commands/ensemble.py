@@ -39,19 +39,6 @@ def _plan(given: argparse.Namespace) -> Plan:
     return Plan(text, folder, given.runs, given.seed, given.spread, given.tilt, choices)
 
 
-def _differ(plan: Plan, members: list[Member]) -> None:
-    """Refuse runs that would all be the same."""
-    text = members[0].text
-    chance = any(
-        settings.value(text[start:end], "drop", name) not in (None, 0, 0.0, [0, 0, 0], "given")
-        for group, start, end in settings.groups(text)
-        if group == "drop"
-        for name in ("spread", "tilt_deg", "orientation")
-    )
-    if plan.runs > 1 and not chance:
-        raise BadRun("nothing is left to chance in this case: give --spread or --tilt")
-
-
 @contextlib.contextmanager
 def _alone(folder: Path) -> Iterator[IO[str]]:
     """Hold the folder, so that a second call there is refused; the system frees it after a kill."""
@@ -109,7 +96,15 @@ def work(given: argparse.Namespace) -> int:
         raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
     plan, engine = _plan(given), Engine(program.find(given.program, given.case), given.jobs, queue)
     members = list(ensemble.members(plan))
-    _differ(plan, members)
+    text = members[0].text
+    chance = any(
+        settings.value(text[start:end], "drop", name) not in (None, 0, 0.0, [0, 0, 0], "given")
+        for group, start, end in settings.groups(text)
+        if group == "drop"
+        for name in ("spread", "tilt_deg", "orientation")
+    )
+    if plan.runs > 1 and not chance:  # they would all be the same
+        raise BadRun("nothing is left to chance in this case: give --spread or --tilt")
     wanted, again = _kept(given, plan, len(members))
     # check the first run of each choice and say what one takes
     said = [program.check(engine.program, m.text) for m in members[: len(plan.choices)]]
@@ -125,7 +120,10 @@ def work(given: argparse.Namespace) -> int:
         sys.stdout.flush()
         ensemble_table.write(plan, table)
         if given.slurm is not None:
-            return _write_slurm(plan, waiting, engine.program, given.slurm)
+            script, numbers = plan.folder / "array.sh", [m.number for m in waiting]
+            script.write_text(slurm.script(plan.folder, numbers, engine.program, given.slurm))
+            print(f"sbatch {script}")
+            return 0
         code = _compute(plan, table, waiting, engine)
         if again is None or code == STOPPED:
             return code
@@ -165,13 +163,6 @@ def _run_again(chosen: list[Member], engine: Engine) -> int:
         print(f"mics-tools ensemble: {member.folder} failed: {ensemble.state(member).reason}",
               file=sys.stderr)  # fmt: skip
     return 3 if failed else 0
-
-
-def _write_slurm(plan: Plan, waiting: list[Member], path: Path, options: list[str]) -> int:
-    script = plan.folder / "array.sh"
-    script.write_text(slurm.script(plan.folder, [m.number for m in waiting], path, options))
-    print(f"sbatch {script}")
-    return 0
 
 
 def _compute(plan: Plan, table: dict[Member, State], waiting: list[Member], engine: Engine) -> int:

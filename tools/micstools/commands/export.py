@@ -7,11 +7,14 @@ import numpy as np
 
 from micstools import command, extras
 from micstools.pictures import exports
-from micstools.reading.reader import BadRun, Run
+from micstools.reading.reader import BadRun
 
 
 def work(given: argparse.Namespace) -> int:
-    formats = exports.parse_formats(given.to)
+    formats = [name.strip().lower() for name in given.to.split(",")]
+    unknown = [name for name in formats if name not in exports.FORMATS]
+    if unknown:
+        raise BadRun(f"--to {given.to}: '{unknown[0]}' is none of {', '.join(exports.FORMATS)}")
     if given.final and "csv" not in formats:
         raise BadRun(f"--final is of csv, which --to {given.to} does not ask for")
     if "pvd" in formats:
@@ -28,17 +31,12 @@ def work(given: argparse.Namespace) -> int:
     for name in formats:
         if given.final and name == "csv":
             print(exports.to_final_csv(run, len(time) - 1, folder))
-            _tell_left_out(run)
+            missing = ", ".join(str(k + 1) for k in np.flatnonzero(~run.bodies.present(-1)))
+            if missing:
+                print(f"left out, not in the tank at the end: {missing}", file=sys.stderr)
         else:
             print(exports.FORMATS[name](run, row, folder))
     if {"stl", "obj"} & set(formats) and (origin := exports.local_origin(run, folder)).any():
         print(f"0, 0, 0 of stl and obj is {', '.join(f'{x:.0f}' for x in origin)} m of the run "
               f"({folder / 'origin.json'})")  # fmt: skip
     return 0
-
-
-def _tell_left_out(run: Run) -> None:
-    """Which blocks the table of the end does not hold."""
-    missing = [str(k + 1) for k in np.flatnonzero(~run.bodies.present(-1))]
-    if missing:
-        print(f"left out, not in the tank at the end: {', '.join(missing)}", file=sys.stderr)

@@ -99,20 +99,16 @@ def _of_ensemble(ensemble: Ensemble) -> int:
             print(ascii_of(f"     {name:20}{unit.text(spread['median'], 5)} ({low} to {high})"))
     path = files.write_table(ensemble.folder / "pile.csv", pile_ensemble.rows(ensemble))
     if ensemble.whole:
-        _write_maps(ensemble)
+        # The maps; where variables were varied in a group for each choice, named by it
+        maps: dict[str, Array] = {}
+        for part in ensemble.parts:
+            if part.whole:
+                here = f"{part.name}/" if part.name else ""
+                maps |= {here + k: v for k, v in asdict(pile_ensemble.maps(part)).items()}
+        _write_h5(ensemble.folder / "pile_maps.h5", maps)
     print(path)
     write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
     return 0
-
-
-def _write_maps(ensemble: Ensemble) -> None:
-    """The maps; where variables were varied in a group for each choice, named by it."""
-    found: dict[str, Array] = {}
-    for part in ensemble.parts:
-        if part.whole:
-            here = f"{part.name}/" if part.name else ""
-            found |= {here + k: v for k, v in asdict(pile_ensemble.maps(part)).items()}
-    _write_h5(ensemble.folder / "pile_maps.h5", found)
 
 
 def _write_h5(path: Path, found: dict[str, Array]) -> None:

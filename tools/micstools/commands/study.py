@@ -20,16 +20,6 @@ from micstools.reading.units import Unit, Units, ascii_of
 _ENDED = (0, 3)  # codes of a run that would end in the same way again
 
 
-def _factors(word: str) -> list[float]:
-    try:
-        found = [float(part) for part in word.split(",")]
-    except ValueError:
-        raise BadRun(f"--cells {word}: must be numbers parted by commas") from None
-    if not all(a < b for a, b in zip([0.0, *found], found, strict=False)):
-        raise BadRun(f"--cells {word}: must be positive and rise")
-    return found
-
-
 def finer(text: str, factor: float) -> str:
     """The case with `factor` times its cells in each direction that has more than one."""
     cells = settings.value(text, "grid", "cells")
@@ -60,7 +50,13 @@ def _code(result: Path) -> int:
 
 
 def work(given: argparse.Namespace) -> int:
-    factors, text = _factors(given.cells), program.case_text(given.case, given.settings)
+    try:
+        factors = [float(part) for part in given.cells.split(",")]
+    except ValueError:
+        raise BadRun(f"--cells {given.cells}: must be numbers parted by commas") from None
+    if not all(a < b for a, b in zip([0.0, *factors], factors, strict=False)):
+        raise BadRun(f"--cells {given.cells}: must be positive and rise")
+    text = program.case_text(given.case, given.settings)
     path = program.find(given.program, given.case)
     folder = given.out or Path(f"mics-study-{given.case.stem}")
     cases = [finer(text, factor) for factor in factors]
@@ -92,17 +88,13 @@ def _tell(
         told = converge(factors, values)
         row: dict[str, object] = {"number": name}
         row["unit"] = pile_numbers.si_units([name]).get(name, "")
-        row |= dict(zip(map(_column, factors), values, strict=True))
+        row |= {f"cells x {k:g}": value for k, value in zip(factors, values, strict=True)}
         rows.append(row | asdict(told))
         unit = pile_numbers.unit(chosen, name)
         print(ascii_of(f"     {name:20}{unit.row(values, digits=5)}  {_words(told, unit)}"))
     known = [{k: None if v != v else v for k, v in row.items()} for row in rows]
     files.write(folder / "study.json", json.dumps(known, indent=2) + "\n")
     print(files.write_table(folder / "study.csv", rows))
-
-
-def _column(factor: float) -> str:
-    return f"cells x {factor:g}"
 
 
 def _words(told: Convergence, unit: Unit) -> str:

@@ -86,7 +86,8 @@ def lines(curves: list[Curve], x: str, y: str, *, limit: float | None = None,
         for c in curves
     ]  # fmt: skip
     if limit is not None:
-        drawn.append(_level(axes, limit))
+        at = f"{float(axes.down(np.array(limit))):.1f}"
+        drawn.append(tag("line", class_="limit", x1=_LEFT, x2=WIDE - _RIGHT, y1=at, y2=at))
     if in_time:
         left, right = axes.across(np.array(axes.x))
         drawn.append(tag("line", class_="now", y1=_TOP, y2=HIGH - _BOTTOM, x1=0, x2=0, hidden=True,
@@ -98,11 +99,6 @@ def lines(curves: list[Curve], x: str, y: str, *, limit: float | None = None,
 def _bounds(values: Array) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     return low, high if high > low else low + 1.0
-
-
-def _level(axes: Axes, value: float) -> Markup:
-    at = float(axes.down(np.array(value)))
-    return tag("line", class_="limit", x1=_LEFT, x2=WIDE - _RIGHT, y1=f"{at:.1f}", y2=f"{at:.1f}")
 
 
 def _thinned(curve: Curve) -> tuple[Array, Array]:

@@ -15,14 +15,13 @@ from micstools.pages.html import Markup, data, document, download, markup, secti
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
 from micstools.piles import pile, pile_ensemble, placing
-from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
+from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Pile
 from micstools.reading import health, places
 from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
 from micstools.reading.shares import in_words
-from micstools.reading.units import Unit, Units, figure
-from micstools.shapes.geometry import Array
+from micstools.reading.units import Units, figure
 
 _SAID = {
     "A": "runs every dropped block ends off the floor (pattern A)",
@@ -123,7 +122,13 @@ def assumptions(ensemble: Ensemble) -> str:
     """What the shares rest on."""
     run = ensemble.example.run
     varied = sorted({name for choice in ensemble.choices for name in choice})
-    said = ["This rests on what was assumed: " + _friction(run, varied)]
+    # Friction and restitution, where they were the same in all runs
+    known = {"friction": "friction of blocks", "wall_friction": "friction of walls and floor"}
+    if run.value("contact", "law") == "restitution":
+        known["restitution"] = "restitution"
+    kept = [f"{words} {run.value('contact', name):.3g}" for name, words in known.items()
+            if f"contact.{name}" not in varied]  # fmt: skip
+    said = ["This rests on what was assumed: " + ", ".join(kept)]
     said += run_words.drops(run, ensemble.units, seeds=False)
     cells = " x ".join(str(len(f) - 1) for f in run.grid.faces)
     model = run.value("contact", "model")
@@ -137,18 +142,6 @@ def assumptions(ensemble: Ensemble) -> str:
         names = ", ".join(f"{k} ({v})" for k, v in ensemble.left_out.items())
         said.append(f"left out for want of an outcome: runs {names}")
     return "; ".join(said) + "."
-
-
-def _friction(run: Run, varied: list[str]) -> str:
-    """Friction and restitution, where they were the same in all runs."""
-    known = [("friction", "friction of blocks"), ("wall_friction", "friction of walls and floor")]
-    if run.value("contact", "law") == "restitution":
-        known.append(("restitution", "restitution"))
-    return ", ".join(
-        f"{words} {run.value('contact', name):.3g}"
-        for name, words in known
-        if f"contact.{name}" not in varied
-    )
 
 
 def _varied(ensemble: Ensemble, name: str) -> str:
@@ -202,7 +195,14 @@ def _plan(ensemble: Ensemble) -> Markup:
     for part, maps in zip(whole, found, strict=True):
         if part.name:
             parts.append(tag("h3", f"{part.name}: {count(len(part.whole), 'pile')}"))
-        parts.append(tag("div", *_maps(maps, top, length), class_="maps"))
+        heights = {"mean height above floor or bed": maps.mean,
+                   "height that 90 % of the piles exceed": maps.low,
+                   "height that 10 % of the piles exceed": maps.high}  # fmt: skip
+        drawn = [views.plan_map(length.of(values), length.of(top), name, length.name)
+                 for name, values in heights.items()]  # fmt: skip
+        cover = "probability that a block lies over a point"
+        cover_map = views.plan_map(100 * maps.cover, 100.0, cover, "%")
+        parts.append(tag("div", cover_map, *drawn, class_="maps"))
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
 
 
@@ -234,23 +234,6 @@ def _landings(ensemble: Ensemble) -> Markup:
     note += "the same mean and covariance; headings go from +y towards +x. In brackets: share and "
     note += "its 95 % interval. mics-tools places writes it in coordinates of a survey."
     return section("landings", "Where each unit lands", *parts, tag("p", note, class_="note"))
-
-
-def _maps(found: Maps, top: float, length: Unit) -> list[Markup]:
-    """Cover and height of a mean pile, on a scale that ends at `top` [m]."""
-    heights = (
-        (found.mean, "mean height above floor or bed"),
-        (found.low, "height that 90 % of the piles exceed"),
-        (found.high, "height that 10 % of the piles exceed"),
-    )
-    cover = "probability that a block lies over a point"
-    return [
-        views.plan_map(100 * found.cover, 100.0, cover, "%"),
-        *(
-            views.plan_map(length.of(values), length.of(top), name, length.name)
-            for values, name in heights
-        ),
-    ]
 
 
 def _histograms(ensemble: Ensemble) -> Markup:
@@ -298,7 +281,15 @@ def _wall(ensemble: Ensemble) -> Markup:
     frame = np.maximum(low - margin, grid.low), np.minimum(high + margin, grid.high)
     parts: list[Markup] = []
     for name, piles in _groups(ensemble):
-        entries = [_thumbnail(p, marks.get(p.number, []), ensemble.units, frame) for p in piles]
+        entries = []
+        for p in piles:
+            colours = views.block_colours(p.run.bodies.dropped, p.run.bodies.n)
+            sheet = views.Sheet(*frame, views.bed_of(p.run), _SMALL)
+            seen = sheet.picture(present_bodies(p.run, -1), colours, "front")[0]
+            words = f"run {p.number}, {ensemble.units.length.text(p.numbers.height)} high"
+            image = tag("img", src=views.uri(seen, 48), alt=f"pile of {words}")
+            said = markup(image, words, *(tag("b", mark) for mark in marks.get(p.number, [])))
+            entries.append(tag("li", tag("button", said, type="button", data_pile=p.number)))
         parts.append(tag("h3", f"{name}, {count(len(piles), 'run')}"))
         parts.append(tag("ul", *entries, class_="wall"))
     close = tag("button", "Close", class_="close", type="button")
@@ -323,19 +314,6 @@ def _groups(ensemble: Ensemble) -> list[tuple[str, list[Pile]]]:
         partly = [p for p in ensemble.piles if not p.complete]
         found = [("All blocks let go", ensemble.whole), ("Blocks without room", partly)]
     return [(name, piles) for name, piles in found if piles]
-
-
-def _thumbnail(p: Pile, marks: list[str], units: Units, frame: tuple[Array, Array]) -> Markup:
-    """A small picture of a pile in a box, its corners `frame`, that a click opens."""
-    b, bodies = p.run.bodies, present_bodies(p.run, -1)
-    colours = views.block_colours(b.dropped, b.n)
-    sheet = views.Sheet(*frame, views.bed_of(p.run), _SMALL)
-    address = views.uri(sheet.picture(bodies, colours, "front")[0], 48)
-    words = f"run {p.number}, {units.length.text(p.numbers.height)} high"
-    image = tag("img", src=address, alt=f"pile of {words}")
-    said = markup(image, words, *(tag("b", mark) for mark in marks))
-    button = tag("button", said, type="button", data_pile=p.number)
-    return tag("li", button)
 
 
 def _scenes(ensemble: Ensemble, north: float | None) -> dict[str, Any]:
@@ -427,7 +405,9 @@ def _health(ensemble: Ensemble) -> Markup:
             each.setdefault(check.name, []).append((p.number, check))
     rows: list[list[object]] = []
     for found in each.values():
-        number, worst = max(found, key=lambda one: _badness(one[1]))
+        # What is not good comes before what is not known, and this before what is good
+        bad = {False: 2, None: 1, True: 0}
+        number, worst = max(found, key=lambda f: (bad[f[1].good], np.nan_to_num(f[1].share)))
         rows.append([*run_page.check_row(worst), f"run {number}"])
     outcomes: dict[str, int] = {}
     for row in ensemble.about["table"]:
@@ -436,11 +416,6 @@ def _health(ensemble: Ensemble) -> Markup:
         rows.append([f"runs that ended: {name}", str(n), "", "", ""])
     said = table(["of all runs, the worst", "found", "wanted", "", "where"], rows, numbers=False)
     return section("health", "Health of the computations", said)
-
-
-def _badness(check: Check) -> tuple[int, float]:
-    """What is not good comes before what is not known, and this before what is good."""
-    return {False: 2, None: 1, True: 0}[check.good], float(np.nan_to_num(check.share))
 
 
 def _case(ensemble: Ensemble, run: Run) -> Markup:

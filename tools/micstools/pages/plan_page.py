@@ -258,7 +258,8 @@ def _ways(found: SetUp) -> list[dict[str, Any]]:
     said: list[tuple[Array, Array, str]] = []
     for tour in tours:
         order = sorted(tour, key=lambda k: float(due[k]))
-        said.append((found.place[order], due[order], f"drops {_span(sorted(tour))}"))
+        span = f"{min(tour) + 1}–{max(tour) + 1}" if len(tour) > 1 else f"{tour[0] + 1}"
+        said.append((found.place[order], due[order], f"drops {span}"))
     for k in np.flatnonzero(b.fixed):
         said.append((b.position[:, k], b.time, f"body {k + 1}"))
     return [
@@ -266,10 +267,6 @@ def _ways(found: SetUp) -> list[dict[str, Any]]:
         for way, when, name in said
         if np.ptp(way, axis=0).any()
     ]
-
-
-def _span(blocks: list[int]) -> str:
-    return f"{blocks[0] + 1}–{blocks[-1] + 1}" if len(blocks) > 1 else str(blocks[0] + 1)
 
 
 def marks(found: SetUp) -> list[dict[str, Any]]:

@@ -30,7 +30,6 @@ from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
-from micstools.shapes.geometry import Array
 
 _START = """
 const runPlayer = startPlayer(document.getElementById('player'));
@@ -245,24 +244,16 @@ def curves(run: Run, shown: Units) -> list[Markup]:
         (force.of(b.fluid_force[..., 2]), f"vertical force of the water [{force.name}]"),
         (force.of(np.linalg.norm(b.contact_force, axis=2)), f"contact force [{force.name}]"),
     ]  # fmt: skip
-    drawn = [
-        charts.lines(_each(run, chosen, values), "time [s]", name)
-        for values, name in wanted
-        if np.isfinite(values).any()
-    ]
+    since = [b.time >= b.release_time[k] - 1e-12 for k in chosen]
+    drawn = []
+    for values, name in wanted:
+        each = [Curve(b.time[rows], values[rows, k], order)
+                for order, (k, rows) in enumerate(zip(chosen, since, strict=True))]  # fmt: skip
+        if np.isfinite(values).any():
+            drawn.append(charts.lines(each, "time [s]", name))
     few = f"The first {_MANY} of {b.dropped.size} blocks." if b.dropped.size > _MANY else ""
     names = [(order, f"block {k + 1}") for order, k in enumerate(chosen)]
     return [tag("div", *drawn, class_="charts"), charts.key(names), tag("p", few, class_="note")]
-
-
-def _each(run: Run, shown: list[int], values: Array) -> list[Curve]:
-    """A curve for each block from its release on."""
-    b = run.bodies
-    found = []
-    for order, k in enumerate(shown):
-        here = b.time >= b.release_time[k] - 1e-12
-        found.append(Curve(b.time[here], values[here, k], order))
-    return found
 
 
 def _health(run: Run, shown: Units) -> Markup:

@@ -43,7 +43,13 @@ def capital(text: str) -> str:
 
 def shapes(run: Run, units: Units) -> list[str]:
     """A sentence for each shape that is used, one for all stones of a family."""
-    found, stones = [], _stones(run)
+    # The stones in use of each family of which there are several
+    used, found = sorted(set(run.bodies.shape)), []
+    families = [str(s.get("name")).strip() for s in run.parameters.get("shape", [])
+                if str(s.get("kind")).strip() == "rock"]  # fmt: skip
+    stones = {f: [name for name in used if re.fullmatch(rf"{re.escape(f)}-\d+", name)]
+              for f in families}  # fmt: skip
+    stones = {family: members for family, members in stones.items() if len(members) > 1}
     for family, members in stones.items():
         mass = [run.shapes[name].volume * run.shapes[name].density for name in members]
         length = [run.shapes[name].length for name in members]
@@ -68,29 +74,11 @@ def shapes(run: Run, units: Units) -> list[str]:
     return found
 
 
-def _stones(run: Run) -> dict[str, list[str]]:
-    """The stones in use of each family of which there are several."""
-    used = sorted(set(run.bodies.shape))
-    families = [str(s.get("name")).strip() for s in run.parameters.get("shape", [])
-                if str(s.get("kind")).strip() == "rock"]  # fmt: skip
-    found = {f: [name for name in used if re.fullmatch(rf"{re.escape(f)}-\d+", name)]
-             for f in families}  # fmt: skip
-    return {family: members for family, members in found.items() if len(members) > 1}
-
-
 def _kind(run: Run, name: str) -> str:
     """The kind of a shape by its name."""
     groups = run.parameters.get("shape", [])
     kind = next((s for s in groups if str(s.get("name")).strip() == name), {})
     return str(kind.get("kind", "")).strip()
-
-
-def _many(run: Run, name: str, n: int) -> str:
-    """As in `12 tetrapods`; with the name of the shape where that is not its kind."""
-    kind = _kind(run, name)
-    word = kind.replace("_", " ") if kind in _KINDS else "block"
-    named = "" if name == kind or not name else f" '{name}'"
-    return f"{n} {word if n == 1 else _PLURALS.get(word, word + 's')}{named}"
 
 
 def blocks(run: Run, units: Units) -> str:
@@ -129,11 +117,17 @@ def _dropped(run: Run, group: list[dict[str, Any]], units: Units, with_seeds: bo
     file = str(one.get("file", "") or "").strip()
     if file:
         return f"blocks are dropped at the places of {file}"
-    said = [_many(run, str(one.get("shape", "") or "").strip(), total), *_times(group)]
-    said.append(f"dropped {_places(group, units)}")
+    # As in `12 tetrapods`; with the name of the shape where that is not its kind
+    name = str(one.get("shape", "") or "").strip()
+    kind = _kind(run, name)
+    word = kind.replace("_", " ") if kind in _KINDS else "block"
+    named = "" if name == kind or not name else f" '{name}'"
+    said = [f"{total} {word if total == 1 else _PLURALS.get(word, word + 's')}{named}"]
+    said += [*_times(group), f"dropped {_places(group, units)}"]
     said += attitude(one)
     seeds = [int(drop.get("seed", 1)) for drop in group]
-    if with_seeds and left_to_chance(one):
+    turned = str(one.get("orientation", "given")).strip() == "random" or one.get("tilt_deg")
+    if with_seeds and (turned or np.any(one.get("spread", 0.0))):
         few = len(set(seeds)) == 1
         said[-1] += f" (seed {seeds[0]})" if few else f" (seeds {min(seeds)} to {max(seeds)})"
     return ", ".join(said)
@@ -184,12 +178,6 @@ def _given(drop: dict[str, Any], name: str) -> bool:
     """Is a place of a drop given?"""
     found = drop.get(name)
     return found is not None and all(isinstance(v, (int, float)) for v in np.ravel(found).tolist())
-
-
-def left_to_chance(drop: dict[str, Any]) -> bool:
-    """Is anything of a &drop random?"""
-    random = str(drop.get("orientation", "given")).strip() == "random"
-    return random or bool(np.any(drop.get("spread", 0.0)) or float(drop.get("tilt_deg", 0.0)))
 
 
 def attitude(drop: dict[str, Any]) -> list[str]:

@@ -11,8 +11,8 @@ from micstools.files import table_text, write
 from micstools.pictures import gltf
 from micstools.reading import vtk_data
 from micstools.reading.overlap import present_bodies
-from micstools.reading.reader import BadRun, Run
-from micstools.shapes.geometry import Array, IntArray
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array, IntArray, normals
 
 FILMED = 30  # frames a second
 FAR = 100  # lengths of the tank from 0, 0, 0: coordinates of a survey
@@ -88,12 +88,15 @@ def to_glb(run: Run, _row: int, folder: Path) -> Path:
 def to_pvd(run: Run, _row: int, folder: Path) -> Path:
     """Blocks and water for ParaView before 5.12: a .vtp file, and a .vti file where there are
     fields, for each time, and a list of each."""
+    import pyvista as pv
+
     times = run.field_times if run.field_times.size else run.bodies.time[_film_rows(run)]
     parts: dict[str, list[tuple[float, str]]] = {}
     for frame, time in enumerate(times):
         if run.bodies.n:
             name = f"blocks-{frame:05d}.vtp"
-            vtk_data.all_blocks(run, run.bodies.row(time)).save(folder / name)
+            blocks = vtk_data.blocks(run, run.bodies.row(time)).values()
+            pv.PolyData().append_polydata(*blocks).save(folder / name)
             parts.setdefault("blocks", []).append((float(time), name))
         if run.field_times.size:
             name = f"fields-{frame:05d}.vti"
@@ -124,16 +127,10 @@ def _collection(files: list[tuple[float, str]]) -> str:
     )
 
 
-def _normals(corners: Array) -> Array:
-    """Unit normals (m, 3) of triangles (m, 3, 3)."""
-    found = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
 def _solid(name: str, corners: Array) -> str:
     """Triangles (m, 3, 3) as a solid of an STL file."""
     lines = [f"solid {name}\n"]
-    for normal, triangle in zip(_normals(corners), corners, strict=True):
+    for normal, triangle in zip(normals(corners), corners, strict=True):
         lines.append(f"facet normal {_words(normal)}\nouter loop\n")
         lines += [f"vertex {_words(corner)}\n" for corner in triangle]
         lines.append("endloop\nendfacet\n")
@@ -153,12 +150,3 @@ FORMATS: dict[str, Writer] = {
     "pvd": to_pvd,
 }
 """What can be written, by its ending."""
-
-
-def parse_formats(word: str) -> list[str]:
-    """The formats of a list such as `glb,csv`."""
-    wanted = [name.strip().lower() for name in word.split(",")]
-    unknown = [name for name in wanted if name not in FORMATS]
-    if unknown:
-        raise BadRun(f"--to {word}: '{unknown[0]}' is none of {', '.join(FORMATS)}")
-    return wanted

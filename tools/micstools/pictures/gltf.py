@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from micstools.pictures.scene import DROPPED, FIXED
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import Array, IntArray
+from micstools.shapes.geometry import Array, IntArray, normals
 from micstools.shapes.shape import Shape
 
 _FLOAT, _UNSIGNED = 5126, 5125
 _UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # x, y, z, w: a quarter turn about x, z becomes y
+_MATT: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
 _GONE = 1e-6  # size of a block that is not there yet; zero has no inverse
 
 
@@ -53,7 +54,6 @@ def write(run: Run, rows: IntArray, path: Path) -> None:
     """Write the motion of the blocks at some rows of a run; the first is time 0 of the film."""
     buffer, b = _Buffer(), run.bodies
     arrays = {name: _arrays(buffer, shape) for name, shape in run.shapes.items()}
-    looks = [_hex(FIXED[0]), *(_hex(colour) for colour in DROPPED)]
     order = {int(k): 1 + place % len(DROPPED) for place, k in enumerate(b.dropped)}
     meshes, nodes = [], []
     for k in range(b.n):
@@ -80,7 +80,10 @@ def write(run: Run, rows: IntArray, path: Path) -> None:
         "scenes": [{"nodes": [b.n]}],
         "nodes": [*nodes, root],
         "meshes": meshes,
-        "materials": [_material(colour) for colour in looks],
+        "materials": [
+            {"pbrMetallicRoughness": _MATT | {"baseColorFactor": [*_linear(colour), 1.0]}}
+            for colour in (FIXED[0], *DROPPED)
+        ],
         "buffers": [{"byteLength": len(buffer.content)}],
         "bufferViews": buffer.views,
         "accessors": buffer.accessors,
@@ -91,11 +94,9 @@ def write(run: Run, rows: IntArray, path: Path) -> None:
 def _arrays(buffer: _Buffer, shape: Shape) -> dict[str, Any]:
     """Corners of the faces of a shape, each with the normal of its face."""
     corner = shape.points[shape.triangles]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     places = buffer.add(corner.reshape(-1, 3).astype(np.float32), "VEC3", bounds=True)
-    normals = buffer.add(np.repeat(normal, 3, axis=0).astype(np.float32), "VEC3")
-    return {"attributes": {"POSITION": places, "NORMAL": normals}}
+    across = buffer.add(np.repeat(normals(corner), 3, axis=0).astype(np.float32), "VEC3")
+    return {"attributes": {"POSITION": places, "NORMAL": across}}
 
 
 def _animation(buffer: _Buffer, run: Run, rows: IntArray, times: Array) -> dict[str, Any]:
@@ -127,15 +128,10 @@ def _turns(quaternion: Array) -> Array:
     return np.asarray(np.roll(unit, -1, axis=1))
 
 
-def _hex(colour: str) -> list[float]:
+def _linear(colour: str) -> list[float]:
     """A colour as linear shares of red, green and blue."""
     shares = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     return [((s + 0.055) / 1.055) ** 2.4 if s > 0.04045 else s / 12.92 for s in shares]
-
-
-def _material(colour: list[float]) -> dict[str, Any]:
-    look = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9}
-    return {"pbrMetallicRoughness": look}
 
 
 def _packed(content: dict[str, Any], numbers: bytearray) -> bytes:

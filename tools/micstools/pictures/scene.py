@@ -210,13 +210,13 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
     return np.where(ids <= run.bodies.n, ids, 0)
 
 
-def new_plotter(width: int, height: int) -> Plotter:
+def new_plotter(width: int, height: int, **more: Any) -> Plotter:
     """A plotter without a window, its picture so large [pixels]."""
     import pyvista as pv
     import vtk
 
     vtk.vtkObject.GlobalWarningDisplayOff()
-    plotter: Plotter = pv.Plotter(off_screen=True, window_size=[width, height])
+    plotter: Plotter = pv.Plotter(off_screen=True, window_size=[width, height], **more)
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.enable_depth_peeling(8)
@@ -438,10 +438,9 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
     """The paper's figure 1: polygons, tetrahedra and contact spheres of a shape, side by side."""
     import pyvista as pv
 
-    plotter = _shape_plotter(width)
+    plotter = new_plotter(width, width // 3, shape=(1, 3), border=False)
     for column, title in enumerate(("polygons", "tetrahedra", "contact spheres")):
         plotter.subplot(0, column)
-        plotter.set_background("white")
         plotter.add_text(title, position=(0.05, 0.92), viewport=True, font_size=11, color="black")
         if column == 0:
             plotter.add_mesh(
@@ -467,15 +466,3 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
     plotter.screenshot(str(path))
     plotter.close()
     return path
-
-
-def _shape_plotter(width: int) -> Plotter:
-    import pyvista as pv
-    import vtk
-
-    vtk.vtkObject.GlobalWarningDisplayOff()
-    plotter = pv.Plotter(
-        off_screen=True, shape=(1, 3), window_size=[width, width // 3], border=False
-    )
-    plotter.enable_anti_aliasing("ssaa")
-    return plotter

@@ -163,7 +163,11 @@ def layer(run: Run, found: Maps, diameter: float, row: int = -1, layers: int | N
         volumes = [body.shape.volume for body in units.values()]
         count = float(len(units))
     else:
-        inside = _within(found, area)
+        # Squares whose middle lies in the area
+        y, x = (found.low[1 - k] + (np.arange(n) + 0.5) * found.step
+                for k, n in enumerate(found.seen.shape))  # fmt: skip
+        (x0, y0), (x1, y1) = area
+        inside = ((y >= y0) & (y < y1))[:, None] & ((x >= x0) & (x < x1))
         low, high = (np.array([*corner, end]) for corner, end in zip(area, (-np.inf, np.inf),
                                                                      strict=True))  # fmt: skip
         size = float(np.prod((high - low)[:2]))
@@ -207,14 +211,6 @@ def words(found: Layer, units: Units) -> list[str]:
         f"{found.packing_density:.3g}.",
         f"Thickness {thick}; layer coefficient of {count} {coefficient}; porosity {void}.",
     ]
-
-
-def _within(found: Maps, area: Corners) -> NDArray[np.bool_]:
-    """Squares (ny, nx) whose middle lies in a rectangle."""
-    rows, columns = found.seen.shape
-    x, y = (found.low[d] + (np.arange(n) + 0.5) * found.step for d, n in ((0, columns), (1, rows)))
-    (x0, y0), (x1, y1) = area
-    return np.asarray(((y >= y0) & (y < y1))[:, None] & ((x >= x0) & (x < x1)))
 
 
 def _surface(thickness: float, whole: float, volume: float, area: float) -> Surface:

@@ -116,14 +116,10 @@ def symmetries(shape: Shape) -> Array:
     found = []
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
-        if np.linalg.det(turn) > 0 and _same_points(corners @ turn.T, corners, shape.radius):
+        far = np.linalg.norm((corners @ turn.T)[:, None] - corners, axis=2).min(axis=1)
+        if np.linalg.det(turn) > 0 and far.max(initial=0.0) < 1e-4 * shape.radius:
             found.append(turn)
     return np.array(found)
-
-
-def _same_points(one: Array, other: Array, size: float) -> bool:
-    near = np.linalg.norm(one[:, None] - other[None], axis=2).min(axis=1)
-    return bool(near.max(initial=0.0) < 1e-4 * size)
 
 
 def attitude_randomness(shape: Shape, quaternions: Array) -> float:

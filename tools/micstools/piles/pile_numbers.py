@@ -141,11 +141,8 @@ def time_to_rest(run: Run) -> float:
     b = run.bodies
     if not b.released(-1).all():
         return float("nan")
-    return max((found.time for found in rest.of_blocks(run)), key=_nan_last, default=0.0)
-
-
-def _nan_last(value: float) -> float:
-    return np.inf if value != value else value
+    times = [found.time for found in rest.of_blocks(run)]
+    return float(np.max(times, initial=0.0))
 
 
 def impact_speed(run: Run) -> float:

@@ -260,14 +260,22 @@ def find_contacts(run: Run, row: int) -> Contacts:
     walls or the bed."""
     reach = scales.reach(run)
     bodies = present_bodies(run, row)
-    balls = {k: _stick_out(body) for k, body in bodies.items() if by_spheres(run, body)}
+    # By how much contact spheres stick out of the sphere around a block [m], of those that collide
+    # by them, or as the ball that they are
+    spheres = run.value("contact", "model") == "spheres"
+    kinds = {s.get("name"): str(s.get("kind")).strip() for s in run.parameters.get("shape", [])}
+    balls: dict[int, float] = {}
+    for k, body in bodies.items():
+        if spheres or kinds.get(body.shape.name) == "sphere":
+            far = np.linalg.norm(body.shape.sphere_centre, axis=1) + body.shape.sphere_radius
+            balls[k] = max(0.0, float(far.max()) - body.shape.radius)
     blocks = {}
     for i, j in near_pairs(run, bodies, reach, balls):
         a = bodies[i]
         b = nearest(run, bodies[j], a)
-        far = apart(a, b)
-        distance = far if far > reach else gap(a, b, reach)
-        if far <= reach < distance and depth(a, b) > 0:
+        between = apart(a, b)
+        distance = between if between > reach else gap(a, b, reach)
+        if between <= reach < distance and depth(a, b) > 0:
             distance = 0.0
         if distance > reach and i in balls and j in balls:
             distance = sphere_gap(a, b)
@@ -282,20 +290,6 @@ def find_contacts(run: Run, row: int) -> Contacts:
         beds[k] = min(beds[k], bed_gap(bodies[k], corners[facets], reach, spheres=True))
     walls = {key: g for key, g in gaps.items() if g <= reach}
     return Contacts(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
-
-
-def _stick_out(body: Placed) -> float:
-    """How far contact spheres reach beyond the sphere around a block, at most [m]."""
-    reach = np.linalg.norm(body.shape.sphere_centre, axis=1) + body.shape.sphere_radius
-    return max(0.0, float(reach.max()) - body.shape.radius)
-
-
-def by_spheres(run: Run, body: Placed) -> bool:
-    """Does a block collide by spheres: by contact spheres, or as the ball that it is?"""
-    if run.value("contact", "model") == "spheres":
-        return True
-    kinds = {s.get("name"): s.get("kind") for s in run.parameters.get("shape", [])}
-    return str(kinds.get(body.shape.name)).strip() == "sphere"
 
 
 @dataclass(frozen=True)

@@ -39,13 +39,6 @@ def blocks(run: Run, row: int) -> dict[int, PolyData]:
     return found
 
 
-def all_blocks(run: Run, row: int) -> PolyData:
-    """The blocks that are released at a row in one; empty where there are none."""
-    import pyvista as pv
-
-    return pv.PolyData().append_polydata(*blocks(run, row).values())
-
-
 def cells(run: Run, fields: Fields) -> ImageData:
     """The grid with the fields of one time as values of its cells."""
     import pyvista as pv

@@ -26,16 +26,6 @@ _HEAD = re.compile(r"^&\w+ \w+ = .*?: ")
 Schema = dict[str, Any]
 
 
-def schema_of(program: Path) -> Schema:
-    """The schema of a case that the program prints."""
-    words = [str(program), "--help=json"]
-    done = subprocess.run(words, capture_output=True, text=True)
-    if done.returncode:
-        raise BadRun(done.stderr.strip() or f"{program} --help=json ended with {done.returncode}")
-    found: Schema = json.loads(done.stdout)
-    return found
-
-
 class Stale(BadRun):
     """A change is based on a text that is no longer the one of the draft."""
 
@@ -48,7 +38,11 @@ class Draft:
         if case.is_dir() or not case.parent.is_dir():
             raise BadRun(f"{case}: must be a file in a folder that is there")
         self.case, self.program = case, program
-        self.schema = schema_of(program)
+        done = subprocess.run([program, "--help=json"], capture_output=True, text=True)
+        if done.returncode:
+            told = done.stderr.strip() or f"{program} --help=json ended with {done.returncode}"
+            raise BadRun(told)
+        self.schema: Schema = json.loads(done.stdout)
         self.lock = threading.RLock()
         self.saved = settings.read(case) if case.exists() else ""
         self.text = self.saved or NEW
@@ -141,18 +135,15 @@ class Draft:
         if name == "shape":
             return settings.value(self.text, "shape", "name") or "cube"
         if name == "position":
-            return self._middle(0.8 if group == "drop" else 0.5)
+            length = settings.value(self.text, "grid", "length") or [1.0, 1.0, 1.0]
+            origin = settings.value(self.text, "grid", "origin") or [0.0, 0.0, 0.0]
+            share = np.array([0.5, 0.5, 0.8 if group == "drop" else 0.5])
+            return (np.array(origin, float) + share * np.array(length, float)).round(9).tolist()
         about = self.variable(group, name)
         if group == "shape" and name == "name":
             return f"shape{1 + sum(g == 'shape' for g, _, _ in settings.groups(self.text))}"
         found = about.get("examples", [about.get("default", "")])
         return found[0] if found else ""
-
-    def _middle(self, height: float) -> list[float]:
-        length = settings.value(self.text, "grid", "length") or [1.0, 1.0, 1.0]
-        origin = settings.value(self.text, "grid", "origin") or [0.0, 0.0, 0.0]
-        place = np.array(origin, float) + np.array([0.5, 0.5, height]) * np.array(length, float)
-        return [round(float(v), 9) for v in place]
 
     def _place(self, order: dict[str, Any]) -> tuple[int, int]:
         """Where the ordered group stands in the text."""

@@ -52,16 +52,12 @@ def _instance(draft: Draft, group: str, n: int, said: dict[str, str] | None, of:
     )
     fields = [_field(draft, group, n, name, said) for name in shown]
     number = f" {n + 1}" if draft.repeats(group) else ""
-    summary = tag("summary", tag("b", f"&{group}{number}"), " ", tag("span", _brief(said)), tools)
+    names = ("title", "name", "kind", "shape", "file", "position")
+    brief = " · ".join(said[name] for name in names if said.get(name))[:60]
+    summary = tag("summary", tag("b", f"&{group}{number}"), " ", tag("span", brief), tools)
     opened = of <= _OPEN or None
     return tag("details", summary, tag("p", class_="wrong", data_of=f"{group}.{n}"), *fields,
                more if others else None, class_="instance", open=opened)  # fmt: skip
-
-
-def _brief(said: dict[str, str]) -> str:
-    """A group in a few words."""
-    names = ("title", "name", "kind", "shape", "file", "position")
-    return " · ".join(said[name] for name in names if said.get(name))[:60]
 
 
 def _field(draft: Draft, group: str, n: int, name: str, said: dict[str, str]) -> Markup:
@@ -71,19 +67,13 @@ def _field(draft: Draft, group: str, n: int, name: str, said: dict[str, str]) ->
     label = tag("span", name, tag("small", f" [{unit}]") if unit not in ("", "-") else None)
     needed = name in draft.needed(group)
     told = tag("small", class_="wrong", id=f"{key}-wrong", role="alert")
-    hint = tag("small", _hint(about, needed), class_="hint-of")
+    default = words_of(about.get("default"))
+    more = "; must be given" if needed else f"; default {default}" if default else ""
+    hint = tag("small", f"{about.get('description', '')}{more}", class_="hint-of")
     ours = {"data_group": group, "data_n": n, "data_variable": name, "aria_describedby":
             f"{key}-wrong", "id": key}  # fmt: skip
     return tag("label", label, _control(about, value, needed, name, ours), told, hint,
                class_="field")  # fmt: skip
-
-
-def _hint(about: Schema, needed: bool) -> str:
-    said = str(about.get("description", ""))
-    if needed:
-        return said + "; must be given"
-    default = words_of(about.get("default"))
-    return f"{said}; default {default}" if default else said
 
 
 def _control(about: Schema, value: str, needed: bool, name: str, ours: dict[str, Any]) -> Markup:

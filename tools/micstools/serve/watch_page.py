@@ -80,21 +80,17 @@ def run_parts(run: Run, found: State) -> Parts:
         [format(float(getattr(s, name)[k]), form) for _, name, form in shown]
         for k in range(s.time.size - 1, max(-1, s.time.size - 1 - _ROWS), -1)
     ]
+    way_on: list[object] = []
+    if not found.running and found.code != 0 and run.restart_files:
+        newest = shlex.quote(str(run.folder / run.restart_files[-1]))
+        way_on = [" It goes on with ", tag("code", f"mics-tools run CASE --restart {newest}"), "."]
     parts = {
-        "state": markup(said + ".", _way_on(run, found)),
+        "state": markup(said + ".", *way_on),
         "bar": bar(found.share, said),
         "facts": _facts(run, found),
         "step": table([words for words, _, _ in shown], rows),
     }
     return parts | {"history": markup(*_history(run))}
-
-
-def _way_on(run: Run, found: State) -> Markup | None:
-    """How a run that was stopped goes on."""
-    if found.running or found.code == 0 or not run.restart_files:
-        return None
-    words = f"mics-tools run CASE --restart {shlex.quote(str(run.folder / run.restart_files[-1]))}"
-    return markup(" It goes on with ", tag("code", words), ".")
 
 
 def _facts(run: Run, found: State) -> Markup:

@@ -56,6 +56,12 @@ def place(points: Array, position: Array, q: Array) -> Array:
     return np.asarray(points @ rotation_matrix(q).T + position)
 
 
+def normals(triangle: Array) -> Array:
+    """Unit normals (m, 3) of triangles (m, 3, 3), by the order of their corners."""
+    found = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
 def tet_volumes(corner: Array) -> Array:
     """Signed volumes of tetrahedra `corner` (k, 4, 3) [m3]."""
     a = corner[:, 1:] - corner[:, :1]
@@ -101,8 +107,7 @@ def distance_to_triangles(points: Array, triangle: Array) -> Array:
 def _squared_to_triangles(p: Array, triangle: Array) -> Array:
     """Squared distances (n, m) of points (n, 1, 3) to triangles (m, 3, 3)."""
     a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normals(triangle)
     height = np.einsum("nmj,mj->nm", p - a, normal)
     in_prism = np.ones(height.shape, bool)
     squared = np.full(height.shape, np.inf)
@@ -178,9 +183,7 @@ def _prism(*corner: Array) -> list[Array]:
 
 def feature_edges(points: Array, triangles: IntArray, cosine: float = 0.9999) -> IntArray:
     """Edges (m, 2) of a surface whose two triangles do not lie in one plane."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normals(points[triangles])
     owners: dict[tuple[int, int], list[int]] = {}
     for t, triangle in enumerate(triangles):
         for k in range(3):

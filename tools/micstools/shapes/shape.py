@@ -10,7 +10,7 @@ from itertools import permutations
 
 import numpy as np
 
-from micstools.shapes.geometry import Array, IntArray, feature_edges, tet_volumes
+from micstools.shapes.geometry import Array, IntArray, feature_edges, normals, tet_volumes
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,7 @@ class Shape:
     @cached_property
     def normals(self) -> Array:
         """Directions (m, 3) across its faces, each once, of either sense."""
-        a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = normals(self.points[self.triangles])
         first = np.abs(np.round(normal, 6)) > 0
         sign = np.sign(np.take_along_axis(normal, first.argmax(axis=1)[:, None], axis=1))
         return np.asarray(np.unique(np.round(sign * normal, 6), axis=0))

@@ -91,7 +91,11 @@ def check(runs: list[Run], checks: Checks) -> None:
         checks.study(f"{flow.name}: drag", {flow.cells: drag}, resolution="cells per diameter")
         checks.figure("drag", "way / D", "-", {name: (flow.way, flow.force[:, 1])})
         if flow.moved:
-            compare_with_held(checks, flow, flows)
+            window = flow.way[-1] / 2, flow.way[-1]  # the same way of the held one
+            for held in flows:
+                same = (held.body, held.reynolds, held.cells, held.half)
+                if not held.moved and same == (flow.body, flow.reynolds, flow.cells, flow.half):
+                    checks.close(f"{name}: drag as held", drag, held.drag(*window), APART)
         elif flow.reynolds < 5e3:
             checks.close(f"{name}: drag", drag, DRAG_AT_1E3, BAND_AT_1E3, flow.cells == 8)
         else:
@@ -104,17 +108,7 @@ def check(runs: list[Run], checks: Checks) -> None:
             checks.true(f"{name}: lift changes sign", turns > 2, f"{turns} times", flow.cells > 11)
             curve = {name: (flow.way, flow.force[:, 0])}
             checks.figure("lift of the long cylinder", "way / D", "-", curve)
-    held = drags.get("sphere, Re 1e4", {})
-    if {6, 8, 12} <= set(held):
-        spread = np.ptp([*held.values()]) / np.mean([*held.values()])
+    spheres = drags.get("sphere, Re 1e4", {})
+    if {6, 8, 12} <= set(spheres):
+        spread = np.ptp([*spheres.values()]) / np.mean([*spheres.values()])
         checks.below("sphere, Re 1e4: spread over 6, 8 and 12 cells", spread, SPREAD)
-
-
-def compare_with_held(checks: Checks, flow: Flow, flows: list[Flow]) -> None:
-    """The drag of a moved body against that of the held one over the same way."""
-    window = flow.way[-1] / 2, flow.way[-1]
-    for held in flows:
-        same = (held.body, held.reynolds, held.cells, held.half)
-        if not held.moved and same == (flow.body, flow.reynolds, flow.cells, flow.half):
-            name = f"{flow.name}, {flow.cells:g} cells: drag as held"
-            checks.close(name, flow.drag(*window), held.drag(*window), APART)

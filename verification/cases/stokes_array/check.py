@@ -19,14 +19,6 @@ def drag_factor(share: float) -> float:
     return 1 / inverse
 
 
-def mean_velocity(run: Run) -> np.ndarray:
-    """Volume flux through every layer of faces across x over the area of the layer [m/s]."""
-    state, periodic = run.restart(), (True, True, True)
-    opened = faces(state, "flow/aperture", run.grid, periodic)[0]
-    velocity = faces(state, "flow/uf", run.grid, periodic)[0]
-    return np.asarray((opened * velocity).mean(axis=(0, 1)))
-
-
 def check(runs: list[Run], checks: Checks) -> None:
     """Drag from the mean flow that a given force drives, and from the force on the sphere."""
     same_grid = []
@@ -34,7 +26,10 @@ def check(runs: list[Run], checks: Checks) -> None:
         edge, g, diameter = float(run.grid.high[0]), run.value("fluid", "gravity")[0], size(run)
         density, viscosity = liquid(run)
         cells, volume = diameter / float(run.grid.spacing[0]), run.shapes["sphere"].volume
-        flow = mean_velocity(run)
+        # Volume flux through every layer of faces across x over the area of the layer [m/s]
+        state, periodic = run.restart(), (True, True, True)
+        opened = faces(state, "flow/aperture", run.grid, periodic)[0]
+        flow = (opened * faces(state, "flow/uf", run.grid, periodic)[0]).mean(axis=(0, 1))
         name = f"{run.folder.name}, {cells:.0f} cells per diameter"
         factor = density * g * edge**3 / (3 * np.pi * viscosity * diameter * flow.mean())
         exact = drag_factor(volume / edge**3)
