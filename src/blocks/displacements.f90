@@ -24,14 +24,6 @@ module displacements_m
     real(wp), allocatable :: energy(:)           !! (n) [J]
   end type displacements_t
 
-  !> One of them, to move it.
-  type :: displacement_t
-    integer :: a = 0, b = 0, id = 0, other = 0
-    real(wp) :: xi(3) = 0.0_wp, k = 0.0_wp
-    real(wp) :: force(3) = 0.0_wp, torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp
-    real(wp) :: energy = 0.0_wp
-  end type displacement_t
-
 contains
 
   !> Make room for at least n displacements.
@@ -80,75 +72,51 @@ contains
   subroutine move_displacements(chosen, from, to)
     logical, intent(in) :: chosen(:)         !! (from%n)
     type(displacements_t), intent(inout) :: from, to
-    logical :: own_is_next   !! an entry of `to` itself comes after that of `from`
-    integer :: i, j, m, kept
+    type(displacements_t) :: list, own   ! `from` and `to` before
+    integer :: i, j
 
-    m = to%n + count(chosen(:from%n))
-    if (m == to%n) return
-    call reserve_displacements(m, to)
-    i = to%n
-    j = from%n
-    to%n = m
-    do while (j > 0)   ! from the end, so that none is overwritten before it has moved
+    if (.not. any(chosen(:from%n))) return
+    list = from
+    own = to
+    from%n = 0
+    to%n = 0
+    i = 1
+    do j = 1, list%n
       if (.not. chosen(j)) then
-        j = j - 1
+        call append(list, j, from)
         cycle
       end if
-      own_is_next = i > 0
-      if (own_is_next) own_is_next = .not. comes_before(to%a(i), to%b(i), to%id(i), from%a(j), &
-                                                        from%b(j), from%id(j))
-      if (own_is_next) then
-        call put_displacement(displacement_at(to, i), m, to)
-        i = i - 1
-      else
-        call put_displacement(displacement_at(from, j), m, to)
-        j = j - 1
-      end if
-      m = m - 1
+      do while (i <= own%n)
+        if (.not. comes_before(own%a(i), own%b(i), own%id(i), list%a(j), list%b(j), &
+                               list%id(j))) exit
+        call append(own, i, to)
+        i = i + 1
+      end do
+      call append(list, j, to)
     end do
-    kept = 0
-    do j = 1, from%n
-      if (chosen(j)) cycle
-      kept = kept + 1
-      if (kept < j) call put_displacement(displacement_at(from, j), kept, from)
+    do i = i, own%n
+      call append(own, i, to)
     end do
-    from%n = kept
   end subroutine move_displacements
 
-  !> Entry i of a list.
-  pure function displacement_at(displacements, i) result(displacement)
-    type(displacements_t), intent(in) :: displacements
+  !> Append entry i of one list to another.
+  subroutine append(list, i, to)
+    type(displacements_t), intent(in) :: list
     integer, intent(in) :: i
-    type(displacement_t) :: displacement
+    type(displacements_t), intent(inout) :: to
 
-    displacement%a = displacements%a(i)
-    displacement%b = displacements%b(i)
-    displacement%id = displacements%id(i)
-    displacement%other = displacements%other(i)
-    displacement%xi = displacements%xi(:, i)
-    displacement%k = displacements%k(i)
-    displacement%force = displacements%force(:, i)
-    displacement%torque_a = displacements%torque_a(:, i)
-    displacement%torque_b = displacements%torque_b(:, i)
-    displacement%energy = displacements%energy(i)
-  end function displacement_at
-
-  !> Put an entry at place i of a list, where there is room.
-  pure subroutine put_displacement(displacement, i, displacements)
-    type(displacement_t), intent(in) :: displacement
-    integer, intent(in) :: i
-    type(displacements_t), intent(inout) :: displacements
-
-    displacements%a(i) = displacement%a
-    displacements%b(i) = displacement%b
-    displacements%id(i) = displacement%id
-    displacements%other(i) = displacement%other
-    displacements%xi(:, i) = displacement%xi
-    displacements%k(i) = displacement%k
-    displacements%force(:, i) = displacement%force
-    displacements%torque_a(:, i) = displacement%torque_a
-    displacements%torque_b(:, i) = displacement%torque_b
-    displacements%energy(i) = displacement%energy
-  end subroutine put_displacement
+    to%n = to%n + 1
+    call reserve_displacements(to%n, to)
+    to%a(to%n) = list%a(i)
+    to%b(to%n) = list%b(i)
+    to%id(to%n) = list%id(i)
+    to%other(to%n) = list%other(i)
+    to%xi(:, to%n) = list%xi(:, i)
+    to%k(to%n) = list%k(i)
+    to%force(:, to%n) = list%force(:, i)
+    to%torque_a(:, to%n) = list%torque_a(:, i)
+    to%torque_b(:, to%n) = list%torque_b(:, i)
+    to%energy(to%n) = list%energy(i)
+  end subroutine append
 
 end module displacements_m
