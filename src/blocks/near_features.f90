@@ -15,7 +15,7 @@ module near_features_m
   public :: near_features_t, near_vertices_t, search_t, list_features, list_bed
   public :: append_facets, append_edges, edge_in_view, way_to_crossing
   public :: poses_t, view_t, meeting_t
-  public :: update_views, inverse_view, seen_from, box_in_view, way_between, closes
+  public :: update_views, seen_from, box_in_view, way_between, closes
 
   !> Poses of a pair of bodies.
   type :: poses_t
@@ -95,9 +95,9 @@ contains
     skin = skin_for(now%speed, search)
     near%valid = max(apart, skin)
     if (apart > skin) return
-    call list_vertices(now%b_in_a, skin, b, a, search, near%of_b)
-    call list_vertices(now%a_in_b, skin, a, b, search, near%of_a)
-    call list_crossings(now%a_in_b, a, b, search, near)
+    call list_vertices(now%b_in_a, now%a_in_b, skin, b, a, search, near%of_b)
+    call list_vertices(now%a_in_b, now%b_in_a, skin, a, b, search, near%of_a)
+    call list_crossings(now, a, b, search, near)
   end subroutine list_features
 
   !> Lists of a body and the bed.
@@ -123,8 +123,9 @@ contains
         call make_ready(near%ready(:, 1), near%ready(:, 2), bed, search%found, .true.)
       end if
     end associate
-    call list_vertices(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
-    call list_crossings(now%a_in_b, surface, bed%surface, search, near)
+    call list_vertices(now%b_in_a, now%a_in_b, near%valid, bed%surface, surface, search, &
+      near%of_b)
+    call list_crossings(now, surface, bed%surface, search, near)
     near%of_a%n_facets = 0
     near%of_a%n_edges = 0
     margin = margin + surface%ball
@@ -166,8 +167,8 @@ contains
 
   !> Vertices of the guest near the surface of the host or inside, each with the facets and edges
   !! that may be nearest to it before the bodies have moved by the skin.
-  subroutine list_vertices(guest_in_host, skin, guest, host, search, list)
-    type(view_t), intent(in) :: guest_in_host
+  subroutine list_vertices(guest_in_host, host_in_guest, skin, guest, host, search, list)
+    type(view_t), intent(in) :: guest_in_host, host_in_guest
     real(wp), intent(in) :: skin               !! [m]
     type(surface_t), intent(in) :: guest, host
     type(search_t), intent(inout) :: search
@@ -179,7 +180,7 @@ contains
     list%n_edges = 0
     if (host%ball > 0.0_wp) return   ! its own centre is the vertex
     margin = skin + search%ahead + guest%ball
-    call box_in_view(inverse_view(guest_in_host), host%low - margin, host%high + margin, low, high)
+    call box_in_view(host_in_guest, host%low - margin, host%high + margin, low, high)
     call gather(guest%vertices, size(guest%weight), low, high, search%guests)
     do m = 1, search%guests%n
       place = seen_from(guest_in_host, guest%vertex(:, search%guests%item(m)))
@@ -277,8 +278,8 @@ contains
   end subroutine append_edges
 
   !> Pairs of convex edges that may cross before the bodies have moved by the skin.
-  subroutine list_crossings(a_in_b, surface_a, surface_b, search, near)
-    type(view_t), intent(in) :: a_in_b
+  subroutine list_crossings(now, surface_a, surface_b, search, near)
+    type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
     type(search_t), intent(inout) :: search
     type(near_features_t), intent(inout) :: near
@@ -288,13 +289,12 @@ contains
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
     cutoff = near%valid + search%ahead + min(surface_a%length, surface_b%length)
-    call box_in_view(inverse_view(a_in_b), surface_b%low - cutoff, surface_b%high + cutoff, low, &
-      high)
+    call box_in_view(now%b_in_a, surface_b%low - cutoff, surface_b%high + cutoff, low, high)
     call gather_edges(surface_a, low, high, search%guests)
     do m = 1, search%guests%n
       i = search%guests%item(m)
       if (i > surface_a%n_convex) exit
-      guest = edge_in_view(a_in_b, surface_a%edge(i))
+      guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       low = min(guest%start, guest%start + guest%extent*guest%along) - cutoff
       high = max(guest%start, guest%start + guest%extent*guest%along) + cutoff
       if (any(low > surface_b%high) .or. any(high < surface_b%low)) cycle
@@ -358,15 +358,6 @@ contains
     now%b_in_a%turn = transpose(now%a_in_b%turn)
     now%b_in_a%x = matmul(now%to_b, now%turn_a)
   end subroutine update_views
-
-  !> The other body seen from the one.
-  pure function inverse_view(view) result(inverse)
-    type(view_t), intent(in) :: view
-    type(view_t) :: inverse
-
-    inverse%turn = transpose(view%turn)
-    inverse%x = -matmul(view%x, view%turn)
-  end function inverse_view
 
   !> A place of one body in the axes of the other [m].
   pure function seen_from(view, place) result(seen)

@@ -7,7 +7,7 @@ module test_near_features_m
   use random_counter_m, only: random_rotation
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges
-  use near_features_m, only: poses_t, view_t, meeting_t, update_views, inverse_view, seen_from, &
+  use near_features_m, only: poses_t, view_t, meeting_t, update_views, seen_from, &
     box_in_view, way_between, near_features_t, near_vertices_t, search_t, list_features, &
     edge_in_view
   use two_cubes_m, only: make_solid, random_poses, moved, meeting_at, distance_from_cube, vector
@@ -180,7 +180,6 @@ contains
       seen = matmul(matmul(now%turn_a, p) - now%to_b, now%turn_b)
       call check('a seen from b', seen_from(now%a_in_b, p), seen, 1.0e-15_wp)
       call check('b seen from a', seen_from(now%b_in_a, seen), p, 1.0e-15_wp)
-      call check('the reverse of a view', seen_from(inverse_view(now%a_in_b), seen), p, 1.0e-15_wp)
     end do
   end subroutine check_views
 
