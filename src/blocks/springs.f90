@@ -16,8 +16,7 @@ module springs_m
   use contact_detection_m, only: detect_contacts, list_bodies
   use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
     sum_forces, push_group, elastic_energy
-  use substep_limits_m, only: limits_t, longest_substep_of, substep_limit, stiffness_limit, &
-    equal_substep
+  use substep_limits_m, only: longest_substep_of, substep_limit, stiffness_limit, equal_substep
   use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
   use resting_m, only: hold_or_wake, restore_contacts
   implicit none
@@ -27,7 +26,9 @@ module springs_m
   integer, parameter :: max_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
   type, extends(contact_solver_t) :: springs_t
-    type(limits_t) :: limits
+    real(wp) :: substep_ratio = 1.0_wp           !! longest substep over the fluid step [-]
+    real(wp) :: longest_substep = 0.0_wp         !! [s]
+    real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
     type(displacements_t) :: before              !! work: displacements of the substep before
     real(wp), allocatable :: support(:, :)
       !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
@@ -52,8 +53,9 @@ contains
     integer :: n
 
     call start_solver(input, blocks, contacts)
-    contacts%limits = limits_t(1.0_wp, longest_substep_of(input), input%courant_max)
-    if (is_given(input%substep_ratio)) contacts%limits%substep_ratio = input%substep_ratio
+    contacts%longest_substep = longest_substep_of(input)
+    contacts%courant_max = input%courant_max
+    if (is_given(input%substep_ratio)) contacts%substep_ratio = input%substep_ratio
     call reserve_displacements(1, contacts%before)
     n = blocks%n
     allocate (contacts%support(6, n), contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), &
@@ -78,8 +80,8 @@ contains
     type(contact_report_t) :: ignored
     integer :: b
 
-    contacts%substep = equal_substep(dt, substep_limit(walls, contacts%detected, blocks, dt, &
-                                                       contacts%limits))
+    contacts%substep = equal_substep(dt, substep_limit(walls, contacts%detected, blocks, &
+      min(contacts%substep_ratio*dt, contacts%longest_substep), contacts%courant_max))
     call match_displacements(contacts%detected, contacts%before, contacts%displacements)
     associate (acting => contacts%detected%acting, counterparts => contacts%detected%counterparts)
       call update_motion(blocks, acting%body(:acting%n), counterparts)
@@ -149,7 +151,8 @@ contains
     end do
     left = dt
     do while (left > 0.0_wp)
-      longest = substep_limit(walls, contacts%detected, blocks, dt, contacts%limits)
+      longest = substep_limit(walls, contacts%detected, blocks, min(contacts%substep_ratio*dt, &
+        contacts%longest_substep), contacts%courant_max)
       if (.not. left < longest*real(max_substeps, wp)) then
         report%info = 1
         return

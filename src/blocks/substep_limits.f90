@@ -11,14 +11,7 @@ module substep_limits_m
   use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
-  public :: limits_t, longest_substep_of, substep_limit, stiffness_limit, equal_substep
-
-  !> The limits of a case.
-  type :: limits_t
-    real(wp) :: substep_ratio = 0.0_wp           !! [-]
-    real(wp) :: longest_substep = 0.0_wp         !! [s]
-    real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
-  end type limits_t
+  public :: longest_substep_of, substep_limit, stiffness_limit, equal_substep
 
 contains
 
@@ -32,20 +25,20 @@ contains
 
   !> Longest substep allowed now [s].
   !!
-  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness,
-  !! and the Courant limit of eq. (6) with the highest relative speed any two points can have of two
-  !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
-  pure function substep_limit(walls, detected, blocks, dt, limits) result(limit)
+  !! The smallest of the longest at all, the limit of stiffness, and the Courant limit of eq. (6)
+  !! with the highest relative speed of any two points of two bodies near one another or of a body
+  !! near a wall. Bodies that are not near stay apart.
+  pure function substep_limit(walls, detected, blocks, longest, courant_max) result(limit)
     type(walls_t), intent(in) :: walls
     type(contact_detection_t), intent(in) :: detected
     type(blocks_t), intent(in) :: blocks
-    real(wp), intent(in) :: dt   !! fluid step [s]
-    type(limits_t), intent(in) :: limits
+    real(wp), intent(in) :: longest       !! at all [s]
+    real(wp), intent(in) :: courant_max   !! C_s of eq. (6) [-]
     real(wp) :: limit
     real(wp) :: speed, near, fastest(2)
     integer :: b
 
-    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(detected))
+    limit = min(longest, stiffness_limit(detected))
     if (detected%exact) then
       near = fastest_near(blocks, detected, detected%surface%near)
     else
@@ -64,8 +57,8 @@ contains
         end if
       end do
     end associate
-    if (.not. near*limit <= limits%courant_max*detected%smallest) then
-      limit = limits%courant_max*detected%smallest/near
+    if (.not. near*limit <= courant_max*detected%smallest) then
+      limit = courant_max*detected%smallest/near
     end if
     speed = sum(fastest)
     if (.not. speed*limit <= detected%unlisted_gap) limit = detected%unlisted_gap/speed
