@@ -83,7 +83,7 @@ contains
     sim%walls%bed => bed
     call blocks_init(case, shapes, sim%blocks)
     call contacts_init(contact_of(case), sim%blocks, sim%contacts)
-    call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
+    call overlap_init(sim%blocks%shapes, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
     allocate (sim%pending(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)

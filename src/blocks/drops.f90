@@ -10,7 +10,7 @@ module drops_m
   use tet_mesh_m, only: shape_t, is_called
   implicit none
   private
-  public :: place_of_block, place_of_body, shape_of_place, count_of_shape, draw_shape
+  public :: place_of_block, place_of_body, shape_of_place, count_of_shape
 
   integer, parameter :: k_shift = 101   !! k_shift .. k_shift+2: shift along x, y, z
   integer, parameter :: k_tilt = 111    !! angle; k_tilt+1, k_tilt+2: axis
@@ -93,15 +93,6 @@ contains
     place%fixed = body%fixed
   end function place_of_body
 
-  !> Number of the shape of a block; 0 if there is none of its name.
-  pure function shape_of_place(place, shapes) result(s)
-    type(place_t), intent(in) :: place
-    type(shape_t), intent(in) :: shapes(:)
-    integer :: s
-
-    s = draw_shape(trim(place%shape), place%seed, place%index, shapes)
-  end function shape_of_place
-
   !> How many blocks of a drop have a shape or may draw it; those that are fixed only if asked for.
   pure function count_of_shape(drop, shape, with_fixed) result(n)
     type(drop_input_t), intent(in) :: drop
@@ -120,23 +111,22 @@ contains
     end if
   end function count_of_shape
 
-  !> Number of the shape of that name, or of a stone of that family drawn for block number `index`
-  !! of a drop; 0 if there is none.
-  pure function draw_shape(name, seed, index, shapes) result(s)
-    character(*), intent(in) :: name
-    integer, intent(in) :: seed, index
+  !> Number of the shape of a block, or of the stone drawn for it where its shape is a family; 0 if
+  !! there is none.
+  pure function shape_of_place(place, shapes) result(s)
+    type(place_t), intent(in) :: place
     type(shape_t), intent(in) :: shapes(:)
     integer :: s
     integer :: n
 
-    n = count(is_called(shapes, name))
-    if (n > 1) n = 1 + int(n*uniform(seed, index, k_member))
+    n = count(is_called(shapes, trim(place%shape)))
+    if (n > 1) n = 1 + int(n*uniform(place%seed, place%index, k_member))
     do s = 1, size(shapes)
-      if (.not. is_called(shapes(s), name)) cycle
+      if (.not. is_called(shapes(s), trim(place%shape))) cycle
       n = n - 1
       if (n == 0) return
     end do
     s = 0
-  end function draw_shape
+  end function shape_of_place
 
 end module drops_m

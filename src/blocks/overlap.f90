@@ -28,21 +28,18 @@ module overlap_m
   type :: overlap_t
     type(solid_t), allocatable :: solid(:)
     type(pair_list_t) :: pairs
-    real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
-    real(wp), allocatable :: radius(:)           !! (bodies) [m]
     type(found_t) :: found                       !! work
   end type overlap_t
 
 contains
 
-  !> Prepare the shapes of a run with n bodies.
-  subroutine overlap_init(shapes, n, overlap)
+  !> Prepare the shapes of a run.
+  subroutine overlap_init(shapes, overlap)
     type(shape_t), intent(in) :: shapes(:)
-    integer, intent(in) :: n                     !! bodies
     type(overlap_t), intent(out) :: overlap
     integer :: s
 
-    allocate (overlap%solid(size(shapes)), overlap%turn(3, 3, n), overlap%radius(n))
+    allocate (overlap%solid(size(shapes)))
     do s = 1, size(shapes)
       call prepare(shapes(s), overlap%solid(s))
     end do
@@ -148,7 +145,8 @@ contains
     type(deep_overlaps_t), intent(inout) :: deep
     integer, parameter :: wall = 0
     logical :: asked(blocks%n)
-    real(wp) :: deepest
+    real(wp), allocatable :: turn(:, :, :)   ! (3, 3, bodies) body to space
+    real(wp) :: radius(blocks%n), deepest    ! [m]
     integer :: a, b, p
 
     depth = 0.0_wp
@@ -156,29 +154,31 @@ contains
     deep%share = 0.0_wp
     if (.not. any(deep%asked)) return
     asked = deep%asked .and. blocks%present
+    allocate (turn(3, 3, blocks%n))
+    radius = 0.0_wp
     do a = 1, blocks%n
       if (.not. asked(a)) cycle
-      overlap%turn(:, :, a) = rotation_matrix(blocks%q(:, a))
+      turn(:, :, a) = rotation_matrix(blocks%q(:, a))
       associate (solid => overlap%solid(blocks%shape(a)))
-        overlap%radius(a) = solid%radius
+        radius(a) = solid%radius
         if (blocks%fixed(a)) cycle
         deepest = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
-          overlap%turn(:, :, a), walls, deepest)
-        if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), overlap%turn(:, :, a), &
+          turn(:, :, a), walls, deepest)
+        if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), turn(:, :, a), &
           walls%bed, overlap%found, deepest)
         call store_overlap(a, wall, deepest, deep)
         depth = max(depth, deepest)
       end associate
     end do
-    call near_pairs(blocks%x, overlap%radius, asked, walls%period, 0.0_wp, overlap%pairs)
+    call near_pairs(blocks%x, radius, asked, walls%period, 0.0_wp, overlap%pairs)
     do p = 1, overlap%pairs%n
       a = overlap%pairs%a(p)
       b = overlap%pairs%b(p)
       if (blocks%fixed(a) .and. blocks%fixed(b)) cycle
       deepest = worth_finding(a, b, depth, deep)
-      call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
-        overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &
+      call deepen_pair(overlap%solid(blocks%shape(a)), turn(:, :, a), &
+        overlap%solid(blocks%shape(b)), turn(:, :, b), &
         blocks%x(:, a) - blocks%x(:, b) - overlap%pairs%shift(:, p), overlap%found, deepest)
       call store_overlap(a, b, deepest, deep)
       depth = max(depth, deepest)

@@ -69,7 +69,7 @@ contains
     call blocks_init(good, made, scene%blocks)
     good%body = [good%body(scene%n + 1), good%body(scene%n + 1)]
     call blocks_init(good, made, scene%two)
-    call overlap_init(made, 2, scene%overlap)
+    call overlap_init(made, scene%overlap)
     if (.not. case%grid%extent_faulty) call walls_init(case%grid, case%boundary, scene%walls)
     scene%walls%bed => bed
     scene%no_walls%period = scene%walls%period

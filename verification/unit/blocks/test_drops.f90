@@ -5,7 +5,7 @@ module test_drops_m
   use vectors_m, only: quaternion_from_axis, quaternion_product
   use rotations_m, only: rotate
   use random_counter_m, only: random_rotation
-  use drops_m, only: place_of_block, count_of_shape, draw_shape
+  use drops_m, only: place_of_block, count_of_shape, shape_of_place
   use tet_mesh_m, only: shape_t
   implicit none
   private
@@ -60,26 +60,32 @@ contains
   subroutine check_stones()
     integer, parameter :: n = 20000
     type(shape_t) :: shapes(5)
-    type(drop_input_t) :: drop
     integer :: times(5), i, s
 
     shapes%name = [character(4) :: 'a-01', 'cube', 'b-01', 'b-02', 'b-03']
     shapes%family = [character(4) :: 'a', '', 'b', 'b', 'b']
-    drop%shape = 'b'
     times = 0
     do i = 1, n
-      s = draw_shape(drop%shape, drop%seed, i, shapes)
+      s = drawn('b', i)
       times(s) = times(s) + 1
     end do
     call check('only stones of the family', all(times(:2) == 0))
     ! standard error 67, four of them
     call check('as often', real(times(3:), wp), spread(real(n, wp)/3, 1, 3), 270.0_wp)
-    drop%shape = 'b-03'
-    call check('one stone', draw_shape(drop%shape, drop%seed, 1, shapes), 5)
-    drop%shape = 'cube'
-    call check('another shape', draw_shape(drop%shape, drop%seed, 1, shapes), 2)
-    drop%shape = 'c'
-    call check('none', draw_shape(drop%shape, drop%seed, 1, shapes), 0)
+    call check('one stone', drawn('b-03', 1), 5)
+    call check('another shape', drawn('cube', 1), 2)
+    call check('none', drawn('c', 1), 0)
+  contains
+    !> Number of the shape of block i with a shape of that name.
+    integer function drawn(name, i)
+      character(*), intent(in) :: name
+      integer, intent(in) :: i
+      type(place_t) :: place
+
+      place%shape = name
+      place%index = i
+      drawn = shape_of_place(place, shapes)
+    end function drawn
   end subroutine check_stones
 
   !> Tilts of a given attitude: uniform angle up to the largest, axes in all directions.

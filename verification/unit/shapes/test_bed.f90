@@ -336,7 +336,7 @@ contains
       case%body(1)%position = x + 0.05_wp*(2*uniform(3, i, 1) - 1.0_wp)*[1.0_wp, 0.3_wp, 0.2_wp]
       case%body(1)%quaternion = random_rotation(9, i)
       call blocks_init(case, shapes, blocks)
-      call overlap_init(shapes, 1, overlap)
+      call overlap_init(shapes, overlap)
       call deep_overlaps_init(blocks, deep)
       deep%asked = .true.
       call max_overlap(walls, blocks, overlap, depth, deep)
