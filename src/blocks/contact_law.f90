@@ -8,7 +8,7 @@ module contact_law_m
   use vectors_m, only: norm
   implicit none
   private
-  public :: contact_law_t, stiffness_t, load_t
+  public :: contact_law_t, stiffness_t
   public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip, power
 
   !> A contact law. Forces are those of springs k d^gamma, along the normal (n) and across (t).
@@ -18,12 +18,15 @@ module contact_law_m
       !! zeta of a pair on all its contact points; 0: each by itself
     real(wp) :: friction = 0.0_wp          !! Coulomb, body on body [-]
     real(wp) :: wall_friction = 0.0_wp     !! Coulomb, body on wall [-]
+    real(wp) :: tangential_share = 0.0_wp
+      !! tangential over normal stiffness and damping; 0: those that follow [-]
+    real(wp) :: k_t = 0.0_wp, eta_t = 0.0_wp   !! [N/m^gamma_t], [N s/m]
   contains
     procedure(normal_constant_i), deferred :: normal_constant
-    procedure(tangential_constant_i), deferred :: tangential_constant
     procedure(normal_stiffness_i), deferred :: normal_stiffness
     procedure(damping_i), deferred :: damping
-    procedure(tangential_damping_i), deferred :: tangential_damping
+    procedure, non_overridable :: tangential_constant
+    procedure, non_overridable :: tangential_damping
   end type contact_law_t
 
   !> The elastic part of a contact point at work.
@@ -37,34 +40,19 @@ module contact_law_m
     real(wp) :: steepness = 1.0_wp         !! [m^(gamma-1)]
   end type stiffness_t
 
-  !> What a contact point may have to carry.
-  type :: load_t
-    real(wp) :: mass = 0.0_wp              !! [kg]
-    real(wp) :: weight = 0.0_wp            !! of that mass [N]
-  end type load_t
-
   abstract interface
     !> Constant k_n of a contact point of weight one: the same whatever else touches, so that the
     !! elastic energy is a function of position only.
-    elemental function normal_constant_i(law, reduced_mass, load, rest_overlap) result(k)
-      import :: contact_law_t, load_t, wp
-      implicit none
-      class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]
-      type(load_t), intent(in) :: load       !! on the contact point
-      real(wp), intent(in) :: rest_overlap           !! overlap that it may make at rest, > 0 [m]
-      real(wp) :: k                          !! [N/m^gamma_n]
-    end function normal_constant_i
-
-    !> Constant k_t of a contact point whose normal constant is k_n.
-    elemental function tangential_constant_i(law, k_n, weight) result(k)
+    elemental function normal_constant_i(law, reduced_mass, load, gravity, rest_overlap) result(k)
       import :: contact_law_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: k_n      !! of the contact point [N/m^gamma_n]
-      real(wp), intent(in) :: weight   !! of the contact point [-]
-      real(wp) :: k                    !! [N/m^gamma_t]
-    end function tangential_constant_i
+      real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]
+      real(wp), intent(in) :: load           !! mass that it may have to carry [kg]
+      real(wp), intent(in) :: gravity        !! >= 0 [m/s2]
+      real(wp), intent(in) :: rest_overlap           !! overlap that it may make at rest, > 0 [m]
+      real(wp) :: k                          !! [N/m^gamma_n]
+    end function normal_constant_i
 
     !> The elastic force of a contact point at its depth.
     elemental subroutine normal_stiffness_i(law, k, weight, d, hard, elastic)
@@ -90,20 +78,31 @@ module contact_law_m
       real(wp), intent(out) :: eta      !! of the contact point [N s/m]
       real(wp), intent(out) :: decay    !! eta of the pair over twice its mass [1/s]
     end subroutine damping_i
-
-    !> Tangential damping of a contact point [N s/m].
-    elemental function tangential_damping_i(law, weight, eta_n, k_t, k_n) result(eta)
-      import :: contact_law_t, wp
-      implicit none
-      class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: weight    !! of the contact point [-]
-      real(wp), intent(in) :: eta_n     !! along the normal [N s/m]
-      real(wp), intent(in) :: k_t, k_n  !! of the contact point [N/m^gamma]
-      real(wp) :: eta
-    end function tangential_damping_i
   end interface
 
 contains
+
+  !> Constant k_t of a contact point whose normal constant is k_n.
+  elemental function tangential_constant(law, k_n, weight) result(k)
+    class(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: k_n      !! of the contact point [N/m^gamma_n]
+    real(wp), intent(in) :: weight   !! of the contact point [-]
+    real(wp) :: k                    !! [N/m^gamma_t]
+
+    k = law%tangential_share*k_n + weight*law%k_t
+  end function tangential_constant
+
+  !> Tangential damping of a contact point [N s/m].
+  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
+    class(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: weight    !! of the contact point [-]
+    real(wp), intent(in) :: eta_n     !! along the normal [N s/m]
+    real(wp), intent(in) :: k_t, k_n  !! of the contact point [N/m^gamma]
+    real(wp) :: eta
+
+    eta = weight*law%eta_t
+    if (law%tangential_share > 0.0_wp) eta = eta_n*(k_t/k_n)
+  end function tangential_damping
 
   !> Energy stored in a spring k d^gamma that pushes with a force: force d/(gamma + 1) [J].
   elemental function energy_of_force(force, gamma, d) result(energy)

@@ -5,12 +5,12 @@ module contact_laws_m
   use case_types_m, only: contact_input_t
   use mass_properties_m, only: surface_area
   use tet_mesh_m, only: shape_t
-  use contact_law_m, only: contact_law_t, stiffness_t, load_t
+  use contact_law_m, only: contact_law_t, stiffness_t
   use law_restitution_m, only: law_restitution
   use law_constants_m, only: law_constants
   implicit none
   private
-  public :: choose_law, load_of, hard_depth, depth_at_rest, rest_overlap_share
+  public :: choose_law, hard_depth, depth_at_rest, rest_overlap_share
 
   real(wp), parameter :: rest_overlap_share = 0.01_wp
     !! overlap at rest over the size of a block, at most
@@ -30,16 +30,6 @@ contains
     law%friction = input%friction
     law%wall_friction = input%wall_friction
   end subroutine choose_law
-
-  !> Load of a contact point that carries a block.
-  elemental function load_of(mass, gravity) result(load)
-    real(wp), intent(in) :: mass      !! of the block [kg]
-    real(wp), intent(in) :: gravity   !! >= 0 [m/s2]
-    type(load_t) :: load
-
-    load%mass = mass
-    load%weight = mass*gravity
-  end function load_of
 
   !> Depth at which contact points of a block harden: a quarter of its mean thickness, twice the
   !! volume over the surface [m].

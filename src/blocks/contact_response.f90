@@ -118,7 +118,8 @@ contains
     centres = 0.0_wp
     load = 0.0_wp
     steep = 0.0_wp
-    of%k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), counterparts%load, &
+    of%k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), &
+      counterparts%heaviest, counterparts%gravity, &
       min(counterparts%rest_overlap(a), counterparts%rest_overlap(b)))
     hard = min(counterparts%hard(a), counterparts%hard(b))
     do t = first, last

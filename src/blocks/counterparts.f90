@@ -5,8 +5,7 @@ module counterparts_m
   use rigid_body_m, only: blocks_t, space_tensor
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
-  use contact_law_m, only: load_t
-  use contact_laws_m, only: load_of, hard_depth, rest_overlap_share
+  use contact_laws_m, only: hard_depth, rest_overlap_share
   implicit none
   private
   public :: counterparts_t, inertia_t, motion_t, wrench_t
@@ -21,8 +20,7 @@ module counterparts_m
     real(wp), allocatable :: hard(:)
       !! (counterparts) depth where contacts harden [m]
     real(wp), allocatable :: rest_overlap(:)           !! (counterparts) largest overlap at rest [m]
-    type(load_t) :: load
-      !! of a contact point under the heaviest free body
+    real(wp) :: heaviest = 0.0_wp                      !! mass of the heaviest free body [kg]
     real(wp), allocatable :: inverse_mass(:)
       !! (counterparts) 0: walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)  !! (3, 3, counterparts) likewise [1/(kg m2)]
@@ -79,9 +77,7 @@ contains
     integer :: w, b
 
     counterparts%gravity = norm(gravity)
-    counterparts%load = load_t()
-    if (.not. all(blocks%fixed)) counterparts%load = &
-      load_of(maxval(blocks%mass, .not. blocks%fixed), counterparts%gravity)
+    counterparts%heaviest = max(0.0_wp, maxval(blocks%mass, .not. blocks%fixed))
     do w = 1, walls%n
       counterparts%v(:, walls%number(w)) = walls%velocity(:, w)
     end do

@@ -2,20 +2,17 @@
 module law_constants_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, stiffness_t, load_t, energy_of_force, power
+  use contact_law_m, only: contact_law_t, stiffness_t, energy_of_force, power
   implicit none
   private
   public :: law_constants_t, law_constants
 
   type, extends(contact_law_t) :: law_constants_t
     real(wp) :: k_n = 0.0_wp, eta_n = 0.0_wp   !! [N/m^gamma_n], [N s/m]
-    real(wp) :: k_t = 0.0_wp, eta_t = 0.0_wp   !! [N/m^gamma_t], [N s/m]
   contains
     procedure :: normal_constant
-    procedure :: tangential_constant
     procedure :: normal_stiffness
     procedure :: damping
-    procedure :: tangential_damping
   end type law_constants_t
 
 contains
@@ -33,27 +30,15 @@ contains
     law%eta_t = input%eta_t
   end function law_constants
 
-  elemental function normal_constant(law, reduced_mass, load, rest_overlap) result(k)
+  elemental function normal_constant(law, reduced_mass, load, gravity, rest_overlap) result(k)
     class(law_constants_t), intent(in) :: law
-    real(wp), intent(in) :: reduced_mass
-    type(load_t), intent(in) :: load
-    real(wp), intent(in) :: rest_overlap
+    real(wp), intent(in) :: reduced_mass, load, gravity, rest_overlap
     real(wp) :: k
 
-    associate (unused => reduced_mass, unused_too => load, unused_as_well => rest_overlap)
+    associate (unused => [reduced_mass, load, gravity, rest_overlap])
     end associate
     k = law%k_n
   end function normal_constant
-
-  elemental function tangential_constant(law, k_n, weight) result(k)
-    class(law_constants_t), intent(in) :: law
-    real(wp), intent(in) :: k_n, weight
-    real(wp) :: k
-
-    associate (unused => k_n)
-    end associate
-    k = weight*law%k_t
-  end function tangential_constant
 
   !> F = w k d^gamma of eq. (1) for the weight w.
   elemental subroutine normal_stiffness(law, k, weight, d, hard, elastic)
@@ -82,15 +67,5 @@ contains
     eta = share*law%eta_n
     decay = 0.5_wp*law%eta_n*total*inverse
   end subroutine damping
-
-  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
-    class(law_constants_t), intent(in) :: law
-    real(wp), intent(in) :: weight, eta_n, k_t, k_n
-    real(wp) :: eta
-
-    associate (unused => eta_n, unused_too => k_t, unused_as_well => k_n)
-    end associate
-    eta = weight*law%eta_t
-  end function tangential_damping
 
 end module law_constants_m

@@ -3,7 +3,7 @@
 module law_restitution_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, stiffness_t, load_t
+  use contact_law_m, only: contact_law_t, stiffness_t
   implicit none
   private
   public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
@@ -17,10 +17,8 @@ module law_restitution_m
     real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) [1/s]
   contains
     procedure :: normal_constant
-    procedure :: tangential_constant
     procedure :: normal_stiffness
     procedure :: damping
-    procedure :: tangential_damping
   end type law_restitution_t
 
   !> Tangential over normal stiffness: a sphere then swings along and across with one frequency.
@@ -40,6 +38,7 @@ contains
 
     law%damping_ratio = damping_ratio_of(max(input%restitution, min_restitution))
     law%frequency = impact_duration(min(law%damping_ratio, critical))/input%contact_time
+    law%tangential_share = tangential_share
   end function law_restitution
 
   !> Restitution of an impact on a linear spring and dashpot that never pulls.
@@ -98,26 +97,14 @@ contains
   !> Spring on which an impact takes the contact time; stiffer where it has to carry a load that
   !! would press it in by more than `rest_overlap`, but no stiffer than that of two blocks as heavy
   !! as the load.
-  elemental function normal_constant(law, reduced_mass, load, rest_overlap) result(k)
+  elemental function normal_constant(law, reduced_mass, load, gravity, rest_overlap) result(k)
     class(law_restitution_t), intent(in) :: law
-    real(wp), intent(in) :: reduced_mass
-    type(load_t), intent(in) :: load
-    real(wp), intent(in) :: rest_overlap
+    real(wp), intent(in) :: reduced_mass, load, gravity, rest_overlap
     real(wp) :: k
 
     k = max(reduced_mass*law%frequency**2, &
-            min(0.5_wp*load%mass*law%frequency**2, load%weight/rest_overlap))
+            min(0.5_wp*load*law%frequency**2, load*gravity/rest_overlap))
   end function normal_constant
-
-  elemental function tangential_constant(law, k_n, weight) result(k)
-    class(law_restitution_t), intent(in) :: law
-    real(wp), intent(in) :: k_n, weight
-    real(wp) :: k
-
-    associate (unused => law, unused_too => weight)
-    end associate
-    k = tangential_share*k_n
-  end function tangential_constant
 
   !> The spring is that of the energy
   !!
@@ -132,26 +119,17 @@ contains
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: k, weight, d, hard
     type(stiffness_t), intent(out) :: elastic
-    real(wp) :: h
+    real(wp) :: h   ! how far into the range where it hardens: (u/d_h)^4 [-]
 
     associate (unused => law)
     end associate
-    h = beyond(weight, d, hard)
+    h = (weight*(max(0.0_wp, d)/hard)**2)**2
     elastic%hardness = (1.0_wp + h)**2   ! the square of ds/du
     elastic%steepness = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
     if (.not. d > 0.0_wp) return
     elastic%force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
     elastic%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
   end subroutine normal_stiffness
-
-  !> How far a contact point is into the range where it hardens: (u/d_h)^4 [-].
-  elemental function beyond(weight, d, hard) result(h)
-    real(wp), intent(in) :: weight    !! [-]
-    real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
-    real(wp) :: h
-
-    h = (weight*(max(0.0_wp, d)/hard)**2)**2
-  end function beyond
 
   !> The share of a contact point in the damping of the pair, whose ratio is that of the impact.
   elemental subroutine damping(law, share, k, total, inverse, eta, decay)
@@ -164,16 +142,5 @@ contains
     eta = share*k*2*law%damping_ratio/sqrt(omega2)
     decay = law%damping_ratio*sqrt(omega2)
   end subroutine damping
-
-  !> As stiffness across to stiffness along the normal.
-  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
-    class(law_restitution_t), intent(in) :: law
-    real(wp), intent(in) :: weight, eta_n, k_t, k_n
-    real(wp) :: eta
-
-    associate (unused => law, unused_too => weight)
-    end associate
-    eta = eta_n*(k_t/k_n)
-  end function tangential_damping
 
 end module law_restitution_m

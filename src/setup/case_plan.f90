@@ -10,8 +10,8 @@ module case_plan_m
   use case_blocks_m, only: blocks_init
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: file_text
-  use contact_law_m, only: contact_law_t, load_t
-  use contact_laws_m, only: choose_law, load_of, rest_overlap_share
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law, rest_overlap_share
   use rest_depth_m, only: heaviest_mass
   use tet_mesh_m, only: shape_t, extreme_of_family
   use given_motion_m, only: fastest_between
@@ -383,7 +383,6 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     class(contact_law_t), allocatable :: law
-    type(load_t) :: heaviest
     type(contact_input_t) :: contact
     character(:), allocatable :: units
     real(wp) :: ratio_step, time_step, courant_step, mass, k
@@ -400,11 +399,11 @@ contains
     call entry('  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
     call choose_law(case%contact, law)
-    heaviest = load_of(heaviest_mass(case, shapes), norm(case%fluid%gravity))
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
-      k = law%normal_constant(mass, heaviest, rest_overlap_share*shapes(s)%smallest_edge)
+      k = law%normal_constant(mass, heaviest_mass(case, shapes), norm(case%fluid%gravity), &
+        rest_overlap_share*shapes(s)%smallest_edge)
       units = ' N/m'
       if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) units = ' N/m^'//brief(law%gamma_n)
       call entry('stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))

@@ -6,8 +6,8 @@ module rest_depth_m
   use case_types_m, only: case_t
   use drops_m, only: count_of_shape
   use tet_mesh_m, only: shape_t, extreme_of_family
-  use contact_law_m, only: contact_law_t, load_t
-  use contact_laws_m, only: choose_law, load_of, hard_depth, depth_at_rest, rest_overlap_share
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law, hard_depth, depth_at_rest, rest_overlap_share
   use law_restitution_m, only: min_restitution
   implicit none
   private
@@ -22,7 +22,6 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(problems_t), intent(inout) :: warnings
     class(contact_law_t), allocatable :: law
-    type(load_t) :: heaviest
     real(wp) :: depth, rest_overlap
     integer :: s
 
@@ -33,10 +32,9 @@ contains
         //'of an impact at least')
     end if
     call choose_law(case%contact, law)
-    heaviest = load_of(heaviest_mass(case, shapes), norm(case%fluid%gravity))
     do s = 1, size(shapes)
       if (n_free(case, shapes(s)) == 0 .or. .not. extreme_of_family(shapes, s)) cycle
-      depth = rest_depth(case, shapes(s), law, heaviest)
+      depth = rest_depth(case, shapes(s), law, heaviest_mass(case, shapes))
       rest_overlap = rest_overlap_share*shapes(s)%smallest_edge
       if (.not. depth > 1.000001_wp*rest_overlap) cycle   ! the law itself may aim at it
       if (case%contact%law == 'restitution') then
@@ -64,22 +62,23 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
     class(contact_law_t), intent(in) :: law
-    type(load_t), intent(in) :: heaviest
+    real(wp), intent(in) :: heaviest           !! mass of that block [kg]
     real(wp) :: depth
     real(wp), parameter :: supports = 3.0_wp   ! of a block at rest, at least; of a sphere one
-    real(wp) :: mass, reduced, own, rest_overlap, k
+    real(wp) :: gravity, mass, reduced, own, rest_overlap, k
 
+    gravity = norm(case%fluid%gravity)
     mass = shape%density*shape%volume
-    own = mass*norm(case%fluid%gravity)
+    own = mass*gravity
     if (shape%kind /= 'sphere') own = own/supports
     rest_overlap = rest_overlap_share*shape%smallest_edge
     reduced = mass
     if (n_free(case, shape) > 1) reduced = 0.5_wp*mass
-    k = law%normal_constant(reduced, heaviest, rest_overlap)
+    k = law%normal_constant(reduced, heaviest, gravity, rest_overlap)
     depth = depth_at_rest(law, k, hard_depth(shape), own)
-    if (.not. heaviest%mass > mass) return
-    k = law%normal_constant(mass, heaviest, rest_overlap)
-    depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest%weight))
+    if (.not. heaviest > mass) return
+    k = law%normal_constant(mass, heaviest, gravity, rest_overlap)
+    depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest*gravity))
   end function rest_depth
 
   !> Mass of the heaviest block that moves freely; 0 if none does [kg].

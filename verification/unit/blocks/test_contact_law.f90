@@ -2,7 +2,7 @@
 module test_contact_law_m
   use check_m, only: check, wp, pi
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, stiffness_t, load_t, stored_energy, normal_force, &
+  use contact_law_m, only: contact_law_t, stiffness_t, stored_energy, normal_force, &
     tangential_force, tangential_slip
   use law_restitution_m, only: law_restitution_t, restitution_of, impact_duration, damping_ratio_of
   use law_constants_m, only: law_constants_t
@@ -10,6 +10,8 @@ module test_contact_law_m
   implicit none
   private
   public :: test_contact_law
+
+  real(wp), parameter :: g = 9.81_wp   !! [m/s2]
 
 contains
 
@@ -121,11 +123,11 @@ contains
     input%restitution = 1.0_wp
     input%contact_time = 1.0e-3_wp
     call choose_law(input, law)
-    k = law%normal_constant(0.25_wp, load_t(), 1.0_wp)
+    k = law%normal_constant(0.25_wp, 0.0_wp, g, 1.0_wp)
     call check('half a period is the contact time', pi*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
     input%restitution = 0.3_wp
     call choose_law(input, law)
-    k = law%normal_constant(0.25_wp, load_t(), 1.0_wp)
+    k = law%normal_constant(0.25_wp, 0.0_wp, g, 1.0_wp)
     call check('damped', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
     call law%damping(1.0_wp, k, 1.0_wp, 4.0_wp, eta, decay)
     call check('damping of that ratio', eta, 2*law%damping_ratio*sqrt(k*0.25_wp), 1.0e-12_wp*eta)
@@ -138,7 +140,7 @@ contains
     input%eta_n = 3.0_wp
     input%eta_t = 5.0_wp
     call choose_law(input, law)
-    call check('given k_n', law%normal_constant(0.25_wp, load_t(), 1.0_wp), input%k_n)
+    call check('given k_n', law%normal_constant(0.25_wp, 0.0_wp, g, 1.0_wp), input%k_n)
     call check('given k_t', law%tangential_constant(5.0_wp, 0.5_wp), 0.5_wp*input%k_t)
     call law%damping(0.5_wp, 1.0_wp, 2.0_wp, 4.0_wp, eta, decay)
     call check('given eta_n', eta, 1.5_wp)
@@ -158,20 +160,20 @@ contains
     do m = 1, size(e)
       input%restitution = e(m)
       call choose_law(input, law)
-      call check('spring of critical damping', law%normal_constant(mass, load_t(), 1.0_wp), &
+      call check('spring of critical damping', law%normal_constant(mass, 0.0_wp, g, 1.0_wp), &
         mass*(2.0_wp/time)**2, 1.0e-9_wp*mass/time**2)
       call check('dashpot', restitution_of(law%damping_ratio), max(e(m), 0.01_wp), 1.0e-12_wp)
     end do
     input%restitution = 0.2_wp
     call choose_law(input, law)
     call check('below critical damping: the contact time', &
-      impact_duration(law%damping_ratio)*sqrt(mass/law%normal_constant(mass, load_t(), 1.0_wp)), &
+      impact_duration(law%damping_ratio)*sqrt(mass/law%normal_constant(mass, 0.0_wp, g, 1.0_wp)), &
       time, 1.0e-15_wp)
   end subroutine check_overdamped
 
   !> A contact point yields under a load as allowed, but is no stiffer than that of two such blocks.
   subroutine check_load()
-    real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, g = 9.81_wp, time = 1.0e-2_wp
+    real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, time = 1.0e-2_wp
     type(contact_input_t) :: input
     class(contact_law_t), allocatable :: law
     real(wp) :: k
@@ -180,15 +182,15 @@ contains
     input%contact_time = time
     call choose_law(input, law)
     k = (pi/time)**2   ! of 1 kg
-    call check('a light load changes nothing', law%normal_constant(mass, load_t(mass, mass*g), &
+    call check('a light load changes nothing', law%normal_constant(mass, mass, g, &
       1.0e-3_wp), mass*k, 1.0e-9_wp)
-    call check('a heavy one gives way by 1 mm', law%normal_constant(mass, load_t(heavy, heavy*g), &
+    call check('a heavy one gives way by 1 mm', law%normal_constant(mass, heavy, g, &
       1.0e-3_wp), heavy*g/1.0e-3_wp, 1.0e-9_wp)
-    call check('no stiffer than two such', law%normal_constant(mass, load_t(heavy, heavy*g), &
+    call check('no stiffer than two such', law%normal_constant(mass, heavy, g, &
       1.0e-6_wp), 0.5_wp*heavy*k, 1.0e-9_wp*heavy*k)
     input%law = 'constants'
     call choose_law(input, law)
-    call check('constants', law%normal_constant(mass, load_t(heavy, heavy*g), 1.0e-6_wp), input%k_n)
+    call check('constants', law%normal_constant(mass, heavy, g, 1.0e-6_wp), input%k_n)
   end subroutine check_load
 
   !> Equations (1) and (2) for one contact point.
