@@ -82,9 +82,10 @@ def trial(shop: Shop, way: str, seconds: float, work: Path) -> tuple[str, list[s
         folder.rename(kept)
     if way == "emptied":
         folder.mkdir()
-    second, in_place = None, way == "unseen in place"
+    second, words = None, ["--output", folder]
+    if way == "unseen in place":
+        words = ["--restart", folder / "restart-a.h5"]
     if way in SECOND:
-        words = ["--restart", folder / "restart-a.h5"] if in_place else ["--output", folder]
         node = {"env": elsewhere(work)} if way.startswith("unseen") else {}
         second = shop.start(*words, **node)
     while second and second.poll() is None and not begun(folder, work, way):
