@@ -9,7 +9,6 @@ module allowed_values_m
   public :: entry_t, words_of, choices
   public :: allowed_t, any_number, positive, not_negative, share, whole, between
 
-
   type :: allowed_t
     real(wp) :: low = -huge(1.0_wp), high = huge(1.0_wp)   !! these: no bound
     logical :: with_low = .true.             !! may the value be `low` itself?
@@ -40,6 +39,9 @@ module allowed_values_m
   end type entry_t
 
   type(allowed_t), parameter :: whole = allowed_t(whole=.true.)   !! any whole number
+  !> Above 0, at most 1.
+  type(allowed_t), parameter :: share = allowed_t(unit='-', low=0.0_wp, with_low=.false., &
+    high=1.0_wp)
 
   !> From the first to the second number, both included.
   interface between
@@ -70,13 +72,6 @@ contains
     allowed = allowed_t(unit=unit, low=0.0_wp)
     if (present(zero)) allowed%zero = zero
   end function not_negative
-
-  !> Above 0, at most 1.
-  pure function share() result(allowed)
-    type(allowed_t) :: allowed
-
-    allowed = allowed_t(unit='-', low=0.0_wp, with_low=.false., high=1.0_wp)
-  end function share
 
   pure function between_reals(low, high, unit) result(allowed)
     real(wp), intent(in) :: low, high

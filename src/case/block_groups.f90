@@ -22,6 +22,7 @@ contains
   subroutine visit_contact(v, contact)
     type(group_visitor_t), intent(inout) :: v
     type(contact_input_t), intent(inout) :: contact
+    character(*), parameter :: law = 'law = ''constants'''
 
     call v%about('how blocks touch one another, the walls and the bed')
     call v%option('model', contact%model, 'surface spheres', 'what touches: points of the ' &
@@ -53,31 +54,25 @@ contains
       //'blocks stiffer. With any law a step of the blocks is a twentieth of it at most', &
       example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
-      //'with law = ''constants'', of each pair of spheres', &
-      example='law = ''constants''  k_n = 2e5')
+      //'with '//law//', of each pair of spheres', example=law//'  k_n = 2e5')
     call v%real('gamma_n', contact%gamma_n, between(1.0_wp, 10.0_wp, '-'), &
-      'power of the overlap, with law = ''constants''', &
-      example='law = ''constants''  gamma_n = 1.5')
+      'power of the overlap, with '//law, example=law//'  gamma_n = 1.5')
     call v%real('eta_n', contact%eta_n, not_negative('N s/m'), &
-      'damping normal to the surface, with law = ''constants''', &
-      example='law = ''constants''  eta_n = 5')
+      'damping normal to the surface, with '//law, example=law//'  eta_n = 5')
     call v%real('k_t', contact%k_t, not_negative('N/m^gamma_t'), &
-      'stiffness along the surface, with law = ''constants''', &
-      example='law = ''constants''  k_t = 2e5')
+      'stiffness along the surface, with '//law, example=law//'  k_t = 2e5')
     call v%real('gamma_t', contact%gamma_t, positive('-'), &
-      'power of the displacement along the surface, with law = ''constants''', &
-      example='law = ''constants''  gamma_t = 1.5')
+      'power of the displacement along the surface, with '//law, example=law//'  gamma_t = 1.5')
     call v%real('eta_t', contact%eta_t, not_negative('N s/m'), &
-      'damping along the surface, with law = ''constants''', &
-      example='law = ''constants''  eta_t = 5')
+      'damping along the surface, with '//law, example=law//'  eta_t = 5')
     call v%real('friction', contact%friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on block', example='0.5')
     call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on wall and bed', example='0.5')
-    call v%real('substep_ratio', contact%substep_ratio, share(), &
+    call v%real('substep_ratio', contact%substep_ratio, share, &
       'longest step of the blocks over that of the run; by default 0.05, in ''light'' 1', &
       example='0.02')
-    call v%real('courant_max', contact%courant_max, share(), 'way of a block in one of its ' &
+    call v%real('courant_max', contact%courant_max, share, 'way of a block in one of its ' &
       //'steps over the size of its contact spheres, at most (eq. (6) of the paper)', &
       example='0.05')
     call v%logical('sleep', contact%sleep, 'blocks at rest cost nothing until something ' &

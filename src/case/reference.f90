@@ -155,8 +155,8 @@ contains
   function group_schema(v) result(text)
     type(group_visitor_t), intent(in) :: v
     character(:), allocatable :: text
-    character(:), allocatable :: needed, rest, rules
-    integer :: i, bar
+    character(:), allocatable :: needed, rules
+    integer :: i
 
     needed = ''
     rules = ''
@@ -176,14 +176,8 @@ contains
     end do
     text = '{"type": "object", "additionalProperties": false, "description": '//quoted(v%meaning)
     if (v%ways /= '') then
-      rest = v%ways//'|'
-      needed = ''
-      do while (rest /= '')
-        bar = index(rest, '|')
-        needed = needed//', {"required": '//strings(rest(:bar - 1))//'}'
-        rest = rest(bar + 1:)
-      end do
-      text = text//', "anyOf": ['//needed(3:)//']'
+      text = text//', "anyOf": [{"required": ' &
+        //replaced(strings(v%ways), '|', '"]}, {"required": ["')//'}]'
     else if (needed /= '') then
       text = text//', "required": '//strings(needed(2:))
     end if

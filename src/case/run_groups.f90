@@ -16,6 +16,7 @@ module run_groups_m
 
   real(wp), parameter :: max_cells = real(huge(0), wp)   !! cells are counted in default integers
   real(wp), parameter :: max_steps = 1.0e9_wp
+  character(1), parameter :: axis(3) = ['x', 'y', 'z']
   real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
 
   !> Volumes and inertias of lengths from this to its inverse stay in the number range [m].
@@ -151,7 +152,6 @@ contains
   pure function side_meaning(s, d) result(meaning)
     integer, intent(in) :: s, d   !! 1 lower or 2 upper side; direction
     character(24) :: meaning
-    character(1), parameter :: axis(3) = ['x', 'y', 'z']
 
     meaning = 'the side of lowest '//axis(d)
     if (s == 2) meaning = 'the side of highest '//axis(d)
@@ -163,7 +163,6 @@ contains
     character(*), intent(in) :: variable, kind
     real(wp), intent(in) :: velocity(3)   !! [m/s]
     integer, intent(in) :: s, d           !! 1 lower or 2 upper side; direction
-    character(1), parameter :: axis(3) = ['x', 'y', 'z']
     character(8), parameter :: sign_word(2) = ['positive', 'negative']
 
     if (is_wall(side_code(kind))) then
@@ -182,7 +181,6 @@ contains
   pure function side_name(s, d) result(name)
     integer, intent(in) :: s, d   !! 1 lower or 2 upper side; direction
     character(5) :: name
-    character(1), parameter :: axis(3) = ['x', 'y', 'z']
     character(4), parameter :: end_name(2) = ['_min', '_max']
 
     name = axis(d)//end_name(s)
