@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--dt", type=float, default=0.1, help="history step [s]")
     parser.add_argument("--contact-time", type=float, default=0.008, help="of a single impact [s]")
-    parser.add_argument("--solver", default="springs", choices=("springs", "impulses"))
+    parser.add_argument("--solver", default="impulses", choices=("springs", "impulses"))
     parser.add_argument("--sleep", action="store_true", help="let blocks at rest sleep")
     parser.add_argument("--every", type=int, default=1, help="depth at every so many late rows")
     parser.add_argument("--program", type=Path, default=ROOT / "mics")

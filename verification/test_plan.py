@@ -40,6 +40,18 @@ def plan_of(tmp_path: Path, blocks: str, fluid: str = "water_level = 2", sides: 
 CUBE = "&drop shape = 'cube'  position = "
 
 
+def test_contact_is_solved_as_the_physics_asks(tmp_path: Path) -> None:
+    """By impulses without a flow, by springs with one, wherever &run stands in the file."""
+    for number, (physics, first, step) in enumerate(
+        [("light", True, "contact"), ("light", False, "contact"), ("coupled", False, "body")]
+    ):
+        (folder := tmp_path / str(number)).mkdir()
+        case = BASIN.format(blocks=f"{CUBE}2, 2, 3 /", fluid="water_level = 2", sides="")
+        case = case.replace("&run", f"&run physics = '{physics}' ")
+        case = "&contact /\n" + case if first else case + "&contact /\n"
+        assert f"{step} step" in mics(["--check"], folder, case).stdout
+
+
 @pytest.mark.parametrize("physics", ["dry", "fluid"])
 def test_other_physics_is_tried_on_a_case_as_it_is(physics: str, tmp_path: Path) -> None:
     """What has no meaning then is passed over with warnings, by plan and run."""

@@ -61,7 +61,7 @@ module impulse_rows_m
     integer, allocatable :: active(:)             !! bodies that move and have rows
     logical, allocatable :: busy(:)               !! (counterparts) has rows
     integer, allocatable :: changed(:)
-      !! (counterparts) sweep in which an impact changed it last, or never
+      !! (counterparts) sweep that changed it last, or never
     real(wp), allocatable :: v(:, :)
       !! (6, counterparts) velocity and spin [m/s], [rad/s]
     real(wp), allocatable :: way(:, :)
@@ -73,7 +73,8 @@ module impulse_rows_m
     !> Work where masses differ much: impulses and velocities before a sweep, directions.
     logical :: hard = .false.
     real(wp) :: h = 0.0_wp, push_max = 0.0_wp     !! sub-sweep, largest speed of opening [s], [m/s]
-    integer :: number = 0                         !! of the sweeps over an impact, 0: over all pairs
+    logical :: impact = .false.                   !! sweeps are over the impulses of a whole step
+    integer :: number = 0                         !! of the sweep, 0: over all pairs
     real(wp) :: small = 0.0_wp                    !! change of a velocity that ends them [m/s]
     logical, allocatable :: reached(:), directed(:)   !! (n_pairs) by them, has a direction now
     real(wp) :: square = 0.0_wp                   !! of the last change of the impulses

@@ -12,7 +12,7 @@
 !! Source: Macklin et al. (2019), Small steps in physics simulation; Catto (2024), Solver2D.
 !!
 !! Where a row was hit, sweeps over the impulses of the whole step go on through the chain of bodies
-!! that this reaches until little changes, 80 at most: v = v_c. Then each row gives back e times
+!! that this reaches until little changes, 160 at most: v = v_c. Then each row gives back e times
 !! what its impulse gained beyond the load before, gamma_b, normal and tangential alike (Poisson):
 !!
 !! $$ \gamma = \gamma_c + e (\gamma_c - \gamma_b), \qquad v = v_c + e (v_c - v_b). $$
@@ -31,11 +31,13 @@ module impulse_sweeps_m
   public :: solve_rows
 
   integer, parameter :: n_correct = 2           !! sweeps with bias; one lets the stack creep
-  integer, parameter :: n_finish = 80           !! sweeps over an impact, at most
+  integer, parameter :: n_busy = 16             !! where bodies change much, at most
+  real(wp), parameter :: busy = 10.0_wp         !! change of a sweep that asks for another [m/s2]
+  integer, parameter :: n_finish = 160          !! sweeps over an impact, at most
   integer, parameter :: n_open = 6              !! sweeps after what it returned
   integer, parameter :: n_hard = 400            !! sweeps where masses differ much, at most
   real(wp), parameter :: max_turn = 0.02_wp     !! by contact in the rest of a step, times e [rad]
-  integer, parameter :: never = -2              !! no sweep over an impact changed it
+  integer, parameter :: never = -2              !! no sweep changed it
   integer, parameter :: worth_threads = 512     !! fewer rows are the work of one thread
   real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
@@ -62,7 +64,8 @@ contains
 
     rows%h = h
     rows%push_max = push_max
-    rows%number = 0
+    rows%small = busy*h
+    rows%impact = .false.
     call apply_remembered(rows)
     do s = 1, n
       call begin_sweep(h, rows)
@@ -203,7 +206,8 @@ contains
     end associate
   end function half_way_past
 
-  !> So many sweeps; where masses differ much as many as they need.
+  !> So many sweeps and, with bias, more over what still changes; where masses differ much as many
+  !! as they need; over an impact until nothing changes.
   subroutine settle(bias, n, backward, rows, change)
     logical, intent(in) :: bias           !! see `correct`
     integer, intent(in) :: n              !! sweeps
@@ -215,22 +219,27 @@ contains
 
     change = 0.0_wp
     first = 0.0_wp
-    if (rows%hard .or. rows%number > 0) call begin_directions(rows)
-    most = merge(n_hard, n, rows%hard)
+    most = n
+    if (rows%hard) then
+      most = n_hard
+    else if (bias) then
+      most = n_busy
+    end if
+    rows%number = merge(1, 0, rows%impact)
+    if (.not. rows%impact) rows%changed = never
+    if (rows%hard .or. rows%impact) call begin_directions(rows)
     do i = 1, most
       call sweep(bias, backward, rows, last)
       backward = .not. backward
       change = max(change, last)
-      if (rows%number > 0) then
+      if (i == n) first = last
+      if (rows%hard .and. .not. rows%impact) then
+        if (i >= n .and. last <= max(residual*first, settled*rows%h)) exit
+      else if (rows%impact .or. i >= n) then
         if (last < rows%small) exit
         rows%number = rows%number + 1
-      else if (rows%hard .and. i >= n) then
-        if (i == n) first = last
-        if (last <= max(residual*first, settled*rows%h)) exit
       end if
-      if (i < most .and. mod(i, 2) == 0 .and. (rows%hard .or. rows%number > 0)) then
-        call accelerate(rows)
-      end if
+      if (i < most .and. mod(i, 2) == 0 .and. (rows%hard .or. rows%impact)) call accelerate(rows)
     end do
   end subroutine settle
 
@@ -260,8 +269,7 @@ contains
     !$omp end parallel
   end subroutine sweep
 
-  !> Correct the impulses of the rows of one pair, one after the other; in sweeps over an impact
-  !! only if a body changed just now.
+  !> Correct the impulses of the rows of one pair, one after the other, if it is to be solved.
   subroutine solve_pair(bias, backward, k, rows, change)
     logical, intent(in) :: bias, backward
     integer, intent(in) :: k
@@ -288,7 +296,7 @@ contains
         associate (row => rows%row(r))
           h = rows%h   ! what pushed in an impact counts as closed
           if (row%impulse(1) > 0.0_wp) then
-            if (rows%number > 0) h = huge(h)
+            if (rows%impact) h = huge(h)
           else if (.not. any(abs(row%impulse) > 0.0_wp)) then   ! idle?
             if (dot_product(row%n, v) + dot_product(row%lever_b, vb(4:6)) &
                 - dot_product(row%lever_a, va(4:6)) >= opening(h, rows%push_max, bias, row)) cycle
@@ -309,7 +317,7 @@ contains
       if (rows%inverse_mass(b) > 0.0_wp) rows%v(:, b) = vb
       rows%turn(:, k) = rows%turn(:, k) + cross(half, total)
       change = max(change, most)
-      if (rows%number > 0 .and. most >= rows%small) call mark(rows%number, k, rows)
+      if (most >= rows%small) call mark(rows%number, k, rows)
     end associate
   end subroutine solve_pair
 
@@ -416,7 +424,7 @@ contains
     end do
   end subroutine go_on
 
-  !> Whether a pair is to be solved: all, or over an impact those with a body that changed just now.
+  !> Whether a pair is to be solved: all, or later those with a body that changed just now.
   pure function is_live(k, rows) result(yes)
     integer, intent(in) :: k
     type(rows_t), intent(in) :: rows
@@ -491,7 +499,7 @@ contains
       rows%returned(:, r) = rows%row(r)%impulse
       rows%row(r)%impulse = rows%total(:, r)
     end do
-    rows%number = 1
+    rows%impact = .true.
     call settle(.false., n_finish, backward, rows, speed)
     do r = 1, rows%n
       associate (row => rows%row(r), gained => rows%gained(:, r))
@@ -536,7 +544,7 @@ contains
     end do
   end subroutine mark_hits
 
-  !> Mark the bodies of a pair that yield as changed by a sweep over an impact.
+  !> Mark the bodies of a pair that yield as changed by a sweep.
   pure subroutine mark(number, k, rows)
     integer, intent(in) :: number, k
     type(rows_t), intent(inout) :: rows

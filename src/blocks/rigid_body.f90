@@ -220,12 +220,14 @@ contains
   !> Move one body that is awake.
   !!
   !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the
-  !! whole step. `omega` belongs to the new attitude afterwards.
+  !! whole step, in parts where it turns far. `omega` belongs to the new attitude afterwards.
   pure subroutine drift_body(dt, b, blocks)
     real(wp), intent(in) :: dt   !! [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
-    real(wp) :: omega(3), half_way(4)
+    real(wp), parameter :: max_turn = 0.05_wp   !! of a part [rad]
+    real(wp) :: omega(3), half_way(4), part
+    integer :: n, i
 
     if (blocks%fixed(b)) then
       ! Move a fixed body for a time dt at its constant given rate, or to `blocks%time` on its path.
@@ -243,10 +245,14 @@ contains
     call shift_body(dt*blocks%v(:, b), b, blocks)
     associate (inverse => blocks%inverse_inertia(:, :, b), l => blocks%l(:, b), &
       q => blocks%q(:, b))
-      omega = angular_velocity(q, l, inverse)
-      half_way = quaternion_product(quaternion_exp(0.5_wp*dt*omega), q)
-      omega = angular_velocity(half_way, l, inverse)
-      q = normalised(quaternion_product(quaternion_exp(dt*omega), q))
+      n = max(1, ceiling(dt*norm(blocks%omega(:, b))/max_turn))
+      part = dt/real(n, wp)
+      do i = 1, n
+        omega = angular_velocity(q, l, inverse)
+        half_way = quaternion_product(quaternion_exp(0.5_wp*part*omega), q)
+        omega = angular_velocity(half_way, l, inverse)
+        q = normalised(quaternion_product(quaternion_exp(part*omega), q))
+      end do
       blocks%omega(:, b) = angular_velocity(q, l, inverse)
     end associate
   end subroutine drift_body

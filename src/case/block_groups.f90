@@ -38,8 +38,11 @@ contains
         'only law = ''restitution'' has it')
     end if
     call v%option('solver', contact%solver, 'springs impulses', 'how the forces are found: ' &
-      //'springs in short steps, or impulses of all contact points together in long ones', &
+      //'impulses of all contact points together in long steps, or springs in short ones; ' &
+      //'''impulses'' is the default with physics = ''dry'' and ''light'' where it can be', &
       example='''impulses''')
+    if (.not. v%given('solver') .and. (contact%model == 'spheres' &
+        .or. contact%law == 'constants')) contact%solver = 'springs'
     if (v%good('solver')) then
       call v%require('solver', contact%solver == 'springs' .or. (contact%model == 'surface' &
         .and. contact%law == 'restitution'), 'needs model = ''surface'' and law = ''restitution''')

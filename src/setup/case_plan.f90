@@ -36,6 +36,8 @@ module case_plan_m
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
   real(wp), parameter :: seconds_per_substep = 1.5e-5_wp   !! of a block that is awake [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
+  real(wp), parameter :: seconds_per_contact = 6.0e-5_wp
+    !! the same of a contact time by impulses [s]
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
   real(wp), parameter :: share_shaken = 0.035_wp
     !! of the time until the last release in which landing blocks keep one awake that lies [-]
@@ -366,7 +368,8 @@ contains
         if (case%contact%sleep .and. size(time) > 0) seconds = seconds &
           + share_shaken*sum(maxval(time) - time)
       end associate
-      seconds = seconds_per_substep*seconds*substeps_per_contact/case%contact%contact_time
+      seconds = merge(seconds_per_contact, seconds_per_substep*substeps_per_contact, &
+        case%contact%solver == 'impulses')*seconds/case%contact%contact_time
     end if
     if (seconds < 100.0_wp) then
       text = brief(seconds, 2)//' s'
@@ -377,7 +380,7 @@ contains
     end if
   end function time_text
 
-  !> Limits of the body steps, and how far the lightest shape gives way.
+  !> Limits of the body steps and, with springs, how far the shapes give way.
   subroutine print_body_steps(case, shapes, d_s)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
@@ -388,6 +391,10 @@ contains
     real(wp) :: ratio_step, time_step, courant_step, mass, k
     integer :: s
 
+    if (case%contact%solver == 'impulses') then
+      call entry('contact step', brief(case%contact%contact_time)//' s, the contact time, at most')
+      return
+    end if
     contact = contact_of(case)
     ratio_step = contact%substep_ratio*case%run%dt
     time_step = case%contact%contact_time/substeps_per_contact

@@ -32,7 +32,7 @@ def start(n: int, box: float, seed: int) -> tuple[Array, Array]:
 
 def case(
     n: int, output: Path, seconds: float = 2.0, dt: float = 0.1, contact_time: float = 0.008,
-    sleep: bool = False, box: float = BOX, seed: int = 1, solver: str = "springs",
+    sleep: bool = False, box: float = BOX, seed: int = 1, solver: str = "impulses",
 ) -> str:  # fmt: skip
     """The case file of n blocks."""
     position, quaternion = start(n, box, seed)

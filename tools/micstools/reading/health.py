@@ -180,7 +180,8 @@ def _made(run: Run, units: Units) -> Check:
     if made.energy > 0:
         words += f", t = {figure(made.time)} s, "
         words += f"block {made.block}" if made.block else "in the springs between blocks"
-    advice = "a smaller &contact substep_ratio or &run dt; see the block at that time in the player"
+    step = "contact_time" if run.value("contact", "solver") == "impulses" else "substep_ratio"
+    advice = f"a smaller &contact {step} or &run dt; see the block at that time in the player"
     return Check(name, words, wanted, made.energy < made.limit, advice, made.energy / made.limit)
 
 

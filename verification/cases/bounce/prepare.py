@@ -77,7 +77,7 @@ def ball(h: float, e: float, end: float, contact_time: float) -> None:
     """A ball dropped from a height; time to see the second impact."""
     what = f"ball from {h:g} m, restitution {e:g}"
     text = HEAD.format(what=what, end=end, dt=1e-3) + TANK.format(height=1.2) + SHAPES
-    text += f"&contact restitution = {e:g}  contact_time = {contact_time:g} /\n"
+    text += f"&contact restitution = {e:g}  contact_time = {contact_time:g}  solver = 'springs' /\n"
     text += body("sphere", (0.1, 0.1, 0.02 + h), 0.0)
     Path(f"ball_h{100 * h:.0f}_e{100 * e:.0f}_{1e6 * contact_time:.0f}us.nml").write_text(text)
 

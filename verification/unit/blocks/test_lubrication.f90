@@ -89,8 +89,8 @@ contains
 
     call start(kind, reshape([0.5_wp, 0.5_wp, d/2 + 5*cell], [3, 1]), &
                reshape([0.0_wp, 0.0_wp, -v], [3, 1]), world)
-    do i = 1, 1000
-      call move(world, 1, 1.0e-5_wp)
+    do i = 1, 4000
+      call move(world, 1, 2.5e-6_wp)
       gap = world%blocks%x(3, 1) - d/2
       if (gap < 0.02_wp*cell) exit
     end do

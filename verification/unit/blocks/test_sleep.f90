@@ -5,7 +5,7 @@ module test_sleep_m
   use vectors_m, only: quaternion_from_axis, quaternion_product
   use rigid_body_m, only: release_body, kinetic_energy, potential_energy, set_velocity_after_fluid
   use displacements_m, only: reserve_displacements
-  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_quiet, &
+  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, wake_tolerance, store_quiet, &
     may_sleep, update_loads
   use world_m, only: world_t, set_up, begin, body, move
   implicit none
@@ -16,7 +16,8 @@ module test_sleep_m
   real(wp), parameter :: g = 9.81_wp, gravity(3) = [0.0_wp, 0.0_wp, -g]   !! [m/s2]
   real(wp), parameter :: mu = 0.4_wp         !! friction of all [-]
   real(wp), parameter :: dt = 1.0e-2_wp      !! [s]
-  character(*), parameter :: models(2) = [character(7) :: 'spheres', 'surface']
+  character(*), parameter :: models(3) = [character(7) :: 'spheres', 'surface', 'surface']
+  character(*), parameter :: solvers(3) = [character(8) :: 'springs', 'springs', 'impulses']
   integer :: model
 
 contains
@@ -24,7 +25,7 @@ contains
   subroutine test_sleep()
     call check_balanced()
     call check_loads()
-    do model = 1, 2
+    do model = 1, size(models)
       call check_quiet()
       call check_rest()
       call check_hit()
@@ -126,7 +127,7 @@ contains
     character(*), intent(in), optional :: contact   !! variables of &contact
     character(:), allocatable :: friction
 
-    friction = '" friction=.4 wall_friction=.4 '
+    friction = '" solver="'//trim(solvers(model))//'" friction=.4 wall_friction=.4 '
     if (present(contact)) friction = friction//contact
     call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="cube" ' &
       //'kind="cube" size=.02 refinement=1/ &shape name="slab" kind="box" size=.12,.12,.02 ' &
@@ -176,8 +177,10 @@ contains
     call check('nobody sleeps without sleep', count(two%blocks%asleep), 0)
     call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp)
     call check('no substeps', one%contact%substeps, 0)
-    call check('same poses', one%blocks%x - two%blocks%x, 0.0_wp, 1.0e-8_wp)
-    call check('same energy', one%contact%energy/two%contact%energy, 1.0_wp, 2*rest_tolerance)
+    call check('same poses', one%blocks%x - two%blocks%x, 0.0_wp, &
+      merge(1.0e-7_wp, 1.0e-8_wp, solvers(model) == 'impulses'))   ! overlaps creep back
+    call check('same energy', one%contact%energy, two%contact%energy, &
+      2*rest_tolerance*two%contact%energy)
     call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
     call check('balance', &
       one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g, 0.0_wp, 1.0e-12_wp)
@@ -234,7 +237,8 @@ contains
 
     call start(tower(1, 1)//body('cube', [0.5_wp + 0.3_wp*d, 0.5_wp, 1.5_wp*d]) &
       //body('cube', [0.5_wp - 4*d, 0.5_wp, 0.55_wp*d], [1.0_wp, 0.0_wp, 0.0_wp], &
-      more='fixed=T release_time=1'), one, two, 'courant_max=.01')   ! free of the substeps
+      more='fixed=T release_time=1'), one, two, &
+      merge('courant_max=.01 ', repeat(' ', 16), solvers(model) == 'springs'))   ! free of substeps
     call run(1.0_wp, one, two)
     call check('both sleep', count(one%blocks%asleep), 2)
     call release_body(1.0_wp, 3, one%blocks)
@@ -245,8 +249,8 @@ contains
     call check('both are awake', count(one%blocks%asleep), 0)
     call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
     call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
-    call check('the lower one as awake', one%blocks%x(:, 1) - two%blocks%x(:, 1), 0.0_wp, 0.01_wp*d)
-    call check('the upper one as awake', one%blocks%x(:, 2) - two%blocks%x(:, 2), 0.0_wp, 0.01_wp*d)
+    call check('both as awake', one%blocks%x(:, :2) - two%blocks%x(:, :2), 0.0_wp, &
+      merge(0.1_wp, 0.01_wp, solvers(model) == 'impulses')*d)   ! its steps are others
   end subroutine check_support
 
   !> On a slope a little steeper than friction bears a cube never sleeps, on one less steep it does.
@@ -273,14 +277,14 @@ contains
     call move(world, 1, dt)
     call check('awake on the slope', .not. world%blocks%asleep(1))
     call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
-    call check('keeps its displacements: energy', world%contact%energy/energy, 1.0_wp, 0.01_wp)
+    call check('keeps its displacements: energy', world%contact%energy, energy, 0.01_wp*energy)
   end subroutine check_slope
 
-  !> Fluid force on a sleeper grows: it slides once it passes friction, within 2 % of the load, and
-  !! not before; then it comes to rest when the force ends.
+  !> Fluid force on a sleeper grows: it slides once it passes friction by 2 % of all that loads it,
+  !! and not before; then it comes to rest when the force ends.
   subroutine check_flow()
     type(world_t) :: world
-    real(wp) :: force
+    real(wp) :: force, late
     integer :: n
 
     call start(tower(1, 1), world)
@@ -295,7 +299,9 @@ contains
       call check_balance(world)
       if (world%blocks%v(1, 1) > 1.0e-3_wp) exit
     end do
-    call check('slides at mu W', force/(mu*world%blocks%mass(1)*g), 1.0_wp, 0.015_wp)
+    late = merge(wake_tolerance*sqrt(1.0_wp + mu**2)/mu, 0.01_wp, solvers(model) == 'impulses')
+    call check('slides at mu W', force/(mu*world%blocks%mass(1)*g), 1.0_wp + late/2, &
+      0.01_wp + late/2)
     call check('awake in the current', .not. world%blocks%asleep(1))
     world%blocks%fluid_force = 0.0_wp
     call run(1.0_wp, world)
@@ -349,7 +355,7 @@ contains
     call release_body(1.0_wp, n + 1, two%blocks)
     call run(0.04_wp, one, two)
     call check('all of the row are awake', count(one%blocks%asleep), 0)
-    call check('the last one moves', two%blocks%v(1, n) > 0.1_wp)
+    call check('the last one moves', two%blocks%v(1, n) > 0.05_wp)
     call check('row as fast', one%blocks%v(1, :) - two%blocks%v(1, :), 0.0_wp, 0.02_wp)
     call check('energy of the row', (kinetic_energy(one%blocks) &
       + potential_energy(one%case%fluid%gravity, one%blocks) + one%contact%energy) &

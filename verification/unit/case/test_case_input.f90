@@ -24,7 +24,7 @@ contains
     call test_rock()
   end subroutine test_case_input
 
-  !> A substep is a share of a step; in 'light' it may be one.
+  !> A substep of springs is a share of a step; in 'light' it may be one.
   subroutine test_substeps()
     call check('substeps', &
       [substep_ratio('coupled', ''), substep_ratio('dry', ''), substep_ratio('light', ''), &
@@ -39,7 +39,7 @@ contains
     type(problems_t) :: problems
 
     call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid &
-      //'&fluid water_level = 0.1 / &contact '//contact//' /', case, problems)
+      //'&fluid water_level = 0.1 / &contact solver = ''springs'' '//contact//' /', case, problems)
     contact_input = contact_of(case)
     substep_ratio = contact_input%substep_ratio
   end function substep_ratio
