@@ -218,8 +218,9 @@ def test_driven_plate_is_told(model: str, tmp_path: Path) -> None:
     assert warning.startswith("mics: warning: ") and ", t = 0." in warning
     assert "above 20 %" in fault
     assert list((tmp_path / "mics-out").glob("restart-*.h5"))
+    # both sides share the overlap until one takes all of it
     for line, share in ((warning, 0.05), (fault, 0.2)):
-        assert 0.99 * share < float(line.split("reach ")[1].split()[0]) / 0.02 < 1.1 * share
+        assert 0.99 * share < float(line.split("reach ")[1].split()[0]) / 0.02 < 2.1 * share
 
 
 @pytest.mark.parametrize("fixed", ["T", "F"])

@@ -142,7 +142,7 @@ contains
           gap=-point%depth, gap_start=-point%depth, &
           lever_a=cross(point%arm_a, point%normal), lever_b=cross(point%arm_b, point%normal), &
           friction=merge(law%wall_friction, law%friction, point%b < 0))
-        call weigh(point%a, point%b, rows, rows%row(r))
+        call weigh(point%a, point%b, detected%counterparts, rows, rows%row(r))
         call recall(point, h, memory, m, rows%row(r))
         associate (row => rows%row(r))
           w = sqrt(max(point%weight*(2*pi/contact_time)**2, &
@@ -245,9 +245,10 @@ contains
   end subroutine begin_pair
 
   !> Tangents of a row and the masses that two counterparts set against an impulse at it,
-  !! K = J M^-1 J^T.
-  pure subroutine weigh(a, b, rows, row)
+  !! K = J M^-1 J^T; of a sleeper that something moved touches as if it were awake, so that it wakes.
+  pure subroutine weigh(a, b, counterparts, rows, row)
     integer, intent(in) :: a, b
+    type(counterparts_t), intent(in) :: counterparts
     type(rows_t), intent(in) :: rows
     type(row_t), intent(inout) :: row
     real(wp), parameter :: far_from_x = 0.6_wp   !! the normal is, below this cosine
@@ -263,6 +264,12 @@ contains
     k = 0.0_wp
     call add_response(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, k)
     call add_response(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, k)
+    if (max(rows%inverse_mass(a), rows%inverse_mass(b)) <= 0.0_wp) then
+      associate (of => counterparts)
+        call add_response(of%inverse_mass(a), of%inverse_inertia(:, :, a), row%arm_a, k)
+        call add_response(of%inverse_mass(b), of%inverse_inertia(:, :, b), row%arm_b, k)
+      end associate
+    end if
     row%response = matmul(k, row%n)
     row%mass = 1.0_wp/dot_product(row%n, row%response)
     along_1 = matmul(k, row%e1)

@@ -60,7 +60,8 @@ contains
     allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
     contacts%contact_time = input%contact_time
     contacts%restitution = input%restitution
-    contacts%smallest_edge = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
+    if (blocks%n > 0) contacts%smallest_edge &
+      = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
     associate (search => contacts%detected%surface%search)
       search%lasting = 2*input%contact_time   ! lists of fast bodies: two steps
       search%lasting_gaps = 1.0_wp

@@ -45,14 +45,20 @@ contains
     character(*), intent(in) :: path
     type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
+    real(wp), allocatable :: corner(:)
+    integer :: f, n
 
     call self%create(path, .false., state)
     if (.not. (is_root() .and. bed%there)) return
     ! The surface of the bed, repeated between periodic sides; corners are counted from 0.
     call self%file%group('/bed')
     call self%file%store('/bed/points', 'm', [bed%point], shape(bed%point))
-    call self%file%store('/bed/triangles', '1', [real(bed%triangle - 1, wp)], &
-      shape(bed%triangle), as_integer)
+    n = size(bed%triangle, 2)
+    allocate (corner(3*n))   ! one copy: beds are large
+    do f = 1, n
+      corner(3*f - 2:3*f) = real(bed%triangle(:, f) - 1, wp)
+    end do
+    call self%file%store('/bed/triangles', '1', corner, [3, n], as_integer)
     call self%file%flush()
   end subroutine begin_run
 

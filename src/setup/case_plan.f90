@@ -36,8 +36,6 @@ module case_plan_m
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
   real(wp), parameter :: seconds_per_substep = 1.5e-5_wp   !! of a block that is awake [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
-  real(wp), parameter :: seconds_per_contact = 6.0e-5_wp
-    !! the same of a contact time by impulses [s]
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
   real(wp), parameter :: share_shaken = 0.035_wp
     !! of the time until the last release in which landing blocks keep one awake that lies [-]
@@ -368,8 +366,7 @@ contains
         if (case%contact%sleep .and. size(time) > 0) seconds = seconds &
           + share_shaken*sum(maxval(time) - time)
       end associate
-      seconds = merge(seconds_per_contact, seconds_per_substep*substeps_per_contact, &
-        case%contact%solver == 'impulses')*seconds/case%contact%contact_time
+      seconds = seconds_per_substep*seconds*substeps_per_contact/case%contact%contact_time
     end if
     if (seconds < 100.0_wp) then
       text = brief(seconds, 2)//' s'
