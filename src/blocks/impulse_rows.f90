@@ -245,7 +245,7 @@ contains
   end subroutine begin_pair
 
   !> Tangents of a row and the masses that two counterparts set against an impulse at it,
-  !! K = J M^-1 J^T; of a sleeper that something moved touches as if it were awake, so that it wakes.
+  !! K = J M^-1 J^T; of a sleeper that something moved touches as of one awake, so that it wakes.
   pure subroutine weigh(a, b, counterparts, rows, row)
     integer, intent(in) :: a, b
     type(counterparts_t), intent(in) :: counterparts
