@@ -45,20 +45,14 @@ contains
     character(*), intent(in) :: path
     type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
-    real(wp), allocatable :: corner(:)
-    integer :: f, n
 
     call self%create(path, .false., state)
     if (.not. (is_root() .and. bed%there)) return
     ! The surface of the bed, repeated between periodic sides; corners are counted from 0.
     call self%file%group('/bed')
     call self%file%store('/bed/points', 'm', [bed%point], shape(bed%point))
-    n = size(bed%triangle, 2)
-    allocate (corner(3*n))   ! one copy: beds are large
-    do f = 1, n
-      corner(3*f - 2:3*f) = real(bed%triangle(:, f) - 1, wp)
-    end do
-    call self%file%store('/bed/triangles', '1', corner, [3, n], as_integer)
+    call self%file%store('/bed/triangles', '1', from_0(bed%triangle), shape(bed%triangle), &
+      as_integer)
     call self%file%flush()
   end subroutine begin_run
 
@@ -147,6 +141,18 @@ contains
       //zone(:3)//':'//zone(4:5)
   end function time_now
 
+  !> Numbers of points counted from 0, in a row: one copy, for beds are large.
+  pure function from_0(number) result(row)
+    integer, intent(in) :: number(:, :)   !! from 1
+    real(wp) :: row(size(number))
+    integer :: i, m
+
+    m = size(number, 1)
+    do i = 1, size(number, 2)
+      row(m*(i - 1) + 1:m*i) = real(number(:, i) - 1, wp)
+    end do
+  end function from_0
+
   !> The shapes; corners are counted from 0, as h5py and VTK do.
   subroutine write_shapes(blocks, file)
     type(blocks_t), intent(in) :: blocks
@@ -158,9 +164,9 @@ contains
       associate (form => blocks%shapes(s), here => '/shapes/'//trim(blocks%shapes(s)%name))
         call file%group(here)
         call file%store(here//'/points', 'm', [form%point], shape(form%point))
-        call file%store(here//'/triangles', '1', [real(form%triangle - 1, wp)], &
-          shape(form%triangle), as_integer)
-        call file%store(here//'/tets', '1', [real(form%tet - 1, wp)], shape(form%tet), as_integer)
+        call file%store(here//'/triangles', '1', from_0(form%triangle), shape(form%triangle), &
+          as_integer)
+        call file%store(here//'/tets', '1', from_0(form%tet), shape(form%tet), as_integer)
         call file%store(here//'/sphere_centre', 'm', [form%sphere_centre], &
           shape(form%sphere_centre))
         call file%store(here//'/sphere_radius', 'm', form%sphere_radius)

@@ -385,7 +385,7 @@ contains
     class(contact_law_t), allocatable :: law
     type(contact_input_t) :: contact
     character(:), allocatable :: units
-    real(wp) :: ratio_step, time_step, courant_step, mass, k
+    real(wp) :: ratio_step, time_step, courant_step, heaviest, mass, k
     integer :: s
 
     if (case%contact%solver == 'impulses') then
@@ -403,10 +403,11 @@ contains
     call entry('  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
     call choose_law(case%contact, law)
+    heaviest = heaviest_mass(case, shapes)
     do s = 1, size(shapes)
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
-      k = law%normal_constant(mass, heaviest_mass(case, shapes), norm(case%fluid%gravity), &
+      k = law%normal_constant(mass, heaviest, norm(case%fluid%gravity), &
         rest_overlap_share*shapes(s)%smallest_edge)
       units = ' N/m'
       if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) units = ' N/m^'//brief(law%gamma_n)

@@ -22,7 +22,7 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(problems_t), intent(inout) :: warnings
     class(contact_law_t), allocatable :: law
-    real(wp) :: depth, rest_overlap
+    real(wp) :: heaviest, depth, rest_overlap
     integer :: s
 
     if (size(case%body) + size(case%drop) == 0) return
@@ -32,9 +32,10 @@ contains
         //'of an impact at least')
     end if
     call choose_law(case%contact, law)
+    heaviest = heaviest_mass(case, shapes)
     do s = 1, size(shapes)
       if (n_free(case, shapes(s)) == 0 .or. .not. extreme_of_family(shapes, s)) cycle
-      depth = rest_depth(case, shapes(s), law, heaviest_mass(case, shapes))
+      depth = rest_depth(case, shapes(s), law, heaviest)
       rest_overlap = rest_overlap_share*shapes(s)%smallest_edge
       if (.not. depth > 1.000001_wp*rest_overlap) cycle   ! the law itself may aim at it
       if (case%contact%law == 'restitution') then
