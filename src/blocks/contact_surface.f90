@@ -23,7 +23,7 @@ module contact_surface_m
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use displacements_m, only: comes_before
   use surface_features_m, only: surface_init
-  use surface_search_m, only: surface_t, nearest_on_surface
+  use surface_search_m, only: surface_t, nearest_on_surface, nearest_places
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
   use near_features_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes, &
     near_features_t, search_t, list_features, list_bed, edge_in_view
@@ -397,7 +397,7 @@ contains
     real(wp), parameter :: max_cosine = -0.2_wp   !! of a face and the surface that it looks at [-]
     type(view_t) :: view                      ! of the guest, host axes
     type(contact_point_t) :: point
-    real(wp) :: turn_host(3, 3), place(3), apart, outward(3), arm(3)
+    real(wp) :: turn_host(3, 3), place(3), apart, outward(3)
     integer :: c, m, n, i, edges, next
 
     point%a = pair%a
@@ -422,31 +422,65 @@ contains
         next = edges + list(m + 2)
         place = view%x + view%turn(:, 1)*guest%vertex(1, i) + view%turn(:, 2)*guest%vertex(2, i) &
           + view%turn(:, 3)*guest%vertex(3, i)
+        if (guest%ball > 0.0_wp) then
+          call add_ball_points(list(m + 3:edges - 1), list(edges:next - 1))
+          cycle
+        end if
         call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
           apart, outward)
       end associate
-      point%depth = guest%ball - apart
-      if (point%depth <= -now%gap) cycle
-      if (now%margin > 0.0_wp .and. guest%ball <= 0.0_wp .and. i > guest%n_corners) then
+      if (apart >= now%gap) cycle
+      if (now%margin > 0.0_wp .and. i > guest%n_corners) then
         if (.not. dot_product(matmul(view%turn, guest%facing(:, i)), outward) < max_cosine) cycle
       end if
-      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
-      outward = matmul(turn_host, outward)
+      call add_place(apart, outward)
+    end do
+
+  contains
+
+    !> A ball touches each place that is the nearest of those around it; a ball whose centre is
+    !! inside, the nearest of all.
+    subroutine add_ball_points(facet, edge)
+      integer, intent(in) :: facet(:), edge(:)
+      integer :: number(size(facet) + size(edge)), n_places, k
+      real(wp) :: way(3, size(facet) + size(edge))
+
+      call nearest_places(host, place, guest%ball + now%gap, facet, edge, n_places, number, way)
+      do k = 1, n_places
+        point%other = number(k)
+        apart = norm(way(:, k))
+        call add_place(apart, way(:, k)/apart)
+      end do
+      if (n_places > 0) return
+      call nearest_on_surface(host, place, facet, edge, apart, outward)
+      point%other = 0
+      if (apart <= 0.0_wp) call add_place(apart, outward)
+    end subroutine add_ball_points
+
+    !> Add the contact point of a vertex with a place of the host.
+    subroutine add_place(apart, outward)
+      real(wp), intent(in) :: apart         !! outside the host [m]
+      real(wp), intent(in) :: outward(3)    !! from the host, its axes [-]
+      real(wp) :: arm(3)
+
+      point%depth = guest%ball - apart
       point%weight = guest%weight(i)
+      point%normal = matmul(turn_host, outward)
+      arm = matmul(turn_host, place) - (guest%ball - 0.5_wp*point%depth)*point%normal
       if (guest_is_a) then
         point%id = i
         point%arm_a = arm + now%to_b
         point%arm_b = arm
-        point%normal = -outward
+        point%normal = -point%normal
       else
         point%id = i - size(guest%weight) - 1
         point%arm_a = arm
         point%arm_b = arm - now%to_b
-        point%normal = outward
       end if
-      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
-      call add_point(point, points)
-    end do
+      if (closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) &
+        call add_point(point, points)
+    end subroutine add_place
+
   end subroutine add_vertex_points
 
   !> Contact points of the chosen pairs of edges that cross.

@@ -134,7 +134,7 @@ contains
       call bed_distance(bed, place, margin, max(margin, surface%bounding_radius), search%found, &
         distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
-      reach = abs(distance) + 2*(near%valid + search%ahead)
+      reach = max(abs(distance), surface%ball) + 2*(near%valid + search%ahead)
       if (distance < -margin) call make_ready(place - reach, place + reach, bed, search%found, &
         .true.)
       call append_near(bed%surface, i, place, reach, search, near%of_a)
@@ -189,7 +189,7 @@ contains
       call search_surface(host, place, margin, search%found, distance, outward)
       if (distance > margin) cycle
       call append_near(host, search%guests%item(m), place, &
-        abs(distance) + 2*(skin + search%ahead), search, list)
+        max(abs(distance), guest%ball) + 2*(skin + search%ahead), search, list)
       list%away(list%n) = distance - guest%ball
     end do
     call end_lists(list)

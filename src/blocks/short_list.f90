@@ -112,7 +112,7 @@ contains
         place = seen_from(guest_in_host, guest%vertex(:, list%vertex(m)))
         call nearest_on_surface(host, place, facets, edges, distance, outward)
         if (distance - guest%ball > margin .and. distance < nowhere) cycle
-        cutoff = abs(distance) + 2*margin
+        cutoff = max(abs(distance), guest%ball) + 2*margin
         at = short%n + 1
         short%n = short%n + 3
         call ensure_capacity(short%n, short%item)

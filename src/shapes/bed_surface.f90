@@ -98,9 +98,11 @@ contains
     n = bed%n_made(1) + 1
     bed%n_made(1) = n
     associate (s => bed%surface)
-      s%facet_at(f) = n
       call ensure_capacity(n, s%normal)
       call ensure_capacity(n, s%offset)
+      call ensure_capacity(n, s%facet_number)
+      s%facet_at(f) = n
+      s%facet_number(n) = size(s%edge_at) + f
       call ensure_capacity(n + 1, s%side)
       call ensure_capacity(3*n, s%side_normal)
       call ensure_capacity(3*n, s%side_offset)

@@ -59,6 +59,7 @@ contains
       point_normal, is_corner)
     m = count(edge(4, :) > 0)
     surface%edge_number = [(e, e=1, m)]
+    surface%facet_number = [(m + e, e=1, size(surface%offset))]
     allocate (surface%edge(m), surface%end_outward(3, 2, m))
     do e = 1, m
       surface%edge(e) = edge_between(shape%point(:, edge(1:2, e)), surface%normal(:, edge(3:4, e)))

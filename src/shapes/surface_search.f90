@@ -11,7 +11,7 @@ module surface_search_m
   implicit none
   private
   public :: surface_t, near_list_t, found_t, gather, gather_edges, gather_facets
-  public :: nearest_on_surface, search_surface, min_distance, segment_distance2, nowhere
+  public :: nearest_on_surface, nearest_places, search_surface, min_distance, segment_distance2, nowhere
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
@@ -29,6 +29,7 @@ module surface_search_m
     real(wp), allocatable :: side_normal(:, :), side_offset(:)    !! (3, :), (:) [m]
     type(edge_t), allocatable :: edge(:)         !! those that are not flat, convex ones first
     integer, allocatable :: edge_number(:)       !! (n) of each, where convex ones come first
+    integer, allocatable :: facet_number(:)      !! (n) of each, above those of the edges
     integer :: n_convex = 0
     real(wp), allocatable :: end_outward(:, :, :)   !! (3, 2, n) outward at the start, at the end
     integer, allocatable :: facet_at(:), edge_at(:)
@@ -214,6 +215,71 @@ contains
       end associate
     end do
   end subroutine nearest_on_surface
+
+  !> Places of a surface that are nearer to a point outside than all around them: on the facets that
+  !! the point is straight above, on convex edges and corners. A place is left out that lies behind
+  !! the plane through a nearer one, across the way from there to the point: as facets are convex,
+  !! this leaves of each its nearest place at most, and of places that meet one.
+  pure subroutine nearest_places(surface, x, reach, facet, edge, n, number, way)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: x(3), reach         !! body axes; farther places are left out [m]
+    integer, intent(in) :: facet(:), edge(:)    !! places of facets and edges in their lists
+    integer, intent(out) :: n                   !! found; 0 too if the point is inside
+    integer, intent(out) :: number(:)           !! (n) of edges, then of facets, rising
+    real(wp), intent(out) :: way(:, :)          !! (3, n) from the place to the point [m]
+    real(wp), parameter :: level = 1.0e-10_wp   !! behind a plane, over the square of the way [-]
+    real(wp) :: square(size(number)), s, d(3), above_edge(3)
+    logical :: hidden(size(number))
+    integer :: m, k, c
+
+    n = 0
+    do m = 1, size(edge)
+      associate (e => surface%edge(edge(m)))
+        d = x - e%start
+        s = dot_product(d, e%along)
+        above_edge = e%outward
+        if (s < 0.0_wp) above_edge = surface%end_outward(:, 1, edge(m))
+        if (s > e%extent) above_edge = surface%end_outward(:, 2, edge(m))
+        d = d - min(max(s, 0.0_wp), e%extent)*e%along
+        if (dot_product(d, above_edge) <= 0.0_wp) cycle
+        n = n + 1
+        number(n) = surface%edge_number(edge(m))
+        way(:, n) = d
+      end associate
+    end do
+    do m = 1, size(facet)
+      associate (f => facet(m))
+        s = dot_product(surface%normal(:, f), x) - surface%offset(f)
+        if (s <= 0.0_wp) cycle
+        do c = surface%side(f), surface%side(f + 1) - 1
+          if (dot_product(surface%side_normal(:, c), x) < surface%side_offset(c)) exit
+        end do
+        if (c < surface%side(f + 1)) cycle
+        n = n + 1
+        number(n) = surface%facet_number(f)
+        way(:, n) = s*surface%normal(:, f)
+      end associate
+    end do
+    do m = 1, n
+      square(m) = dot_product(way(:, m), way(:, m))
+    end do
+    do m = 1, n
+      hidden(m) = square(m) >= reach**2
+      do k = 1, n
+        if (hidden(m)) exit
+        if (square(k) > square(m) .or. (k >= m .and. square(k) >= square(m))) cycle
+        hidden(m) = (1.0_wp - level)*square(k) <= dot_product(way(:, m), way(:, k))
+      end do
+    end do
+    m = n
+    n = 0
+    do k = 1, m
+      if (hidden(k)) cycle
+      n = n + 1
+      number(n) = number(k)
+      way(:, n) = way(:, k)
+    end do
+  end subroutine nearest_places
 
   !> Signed distance of a point from the surface, searched in a growing box: exact.
   subroutine search_surface(surface, x, begin, found, distance, outward)

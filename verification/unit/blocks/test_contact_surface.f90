@@ -27,6 +27,7 @@ contains
     call check_faces_on_one_another()
     call check_points_to_come()
     call check_balls()
+    call check_balls_held()
     call check_energy()
     call check_lists()
   end subroutine test_contact_surface
@@ -196,6 +197,27 @@ contains
       call check('its normal', world%points%item(1)%normal, -way(:, m), 1.0e-12_wp)
     end do
   end subroutine check_balls
+
+  !> A ball between the legs of a hexapod touches all of them: two faces in a groove, three edges.
+  subroutine check_balls_held()
+    type(touching_t) :: world
+    real(wp), parameter :: depth = 1.0e-4_wp, half = 0.5_wp*d, away = half - depth, &
+      at(3, 2) = reshape([half + away, half + away, 0.3_wp*half, &
+      spread(half + away*sqrt(0.5_wp), 1, 3)], [3, 2]), &
+      normals(3, 2) = reshape([-1.0_wp, -1.0_wp, 0.0_wp, spread(-sqrt(2.0_wp), 1, 3)], [3, 2])
+    integer :: m, k, i
+
+    do m = 1, 2
+      call new_world(world, [character(7) :: 'hexapod', 'ball'])
+      world%blocks%x(:, 2) = world%blocks%x(:, 1) + at(:, m)
+      call find(world)
+      call check('a ball that is held', world%points%n, m + 1)
+      associate (item => world%points%item(:world%points%n))
+        call check('its depths', item%depth, [(depth, k=1, m + 1)], 1.0e-15_wp)
+        call check('its normals', [(sum(item%normal(i)), i=1, 3)], normals(:, m), 1.0e-12_wp)
+      end associate
+    end do
+  end subroutine check_balls_held
 
   !> The forces of any pair in contact follow from the energy of its springs: the work of a small
   !! motion, in any direction and about any axis, against the change of energy.
