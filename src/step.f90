@@ -132,13 +132,13 @@ contains
     report%overlap_known = .false.
     if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
-    else if (sim%contacts%detected%exact) then
+    else if (sim%contacts%exact) then
       call tic(sim%timer_blocks)   ! for warnings and faults only where bodies have deep contacts
-      call ask_for_deep(sim%contacts%detected%points, sim%blocks, sim%deep)
+      call ask_for_deep(sim%contacts%points, sim%blocks, sim%deep)
       call max_overlap(sim%walls, sim%blocks, sim%overlap, depth, sim%deep)
       call toc(sim%timer_blocks)
     end if
-    if (.not. sim%contacts%detected%exact) call store_points(sim%contacts%detected%points, sim%deep)
+    if (.not. sim%contacts%exact) call store_points(sim%contacts%points, sim%deep)
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
 

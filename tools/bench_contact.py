@@ -1,7 +1,7 @@
 """Time the dry pile of hexapods and measure it.
 
 usage: python tools/bench_contact.py [--n 64] [--time 2] [--box 0.3] [--seed 1] [--threads 1]
-                                     [--dt 0.1] [--contact-time 0.008] [--solver springs]
+                                     [--dt 0.1] [--contact-time 0.008]
                                      [--program ./mics]
 
 N hexapods (edge of a cube 20 mm, 2300 kg/m3) start on a loose grid with random attitudes above
@@ -41,12 +41,11 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--dt", type=float, default=0.1, help="history step [s]")
     parser.add_argument("--contact-time", type=float, default=0.008, help="of a single impact [s]")
-    parser.add_argument("--solver", default="impulses", choices=("springs", "impulses"))
     parser.add_argument("--sleep", action="store_true", help="let blocks at rest sleep")
     parser.add_argument("--every", type=int, default=1, help="depth at every so many late rows")
     parser.add_argument("--program", type=Path, default=ROOT / "mics")
     given = parser.parse_args()
-    kept = ("dt", "contact_time", "sleep", "box", "seed", "solver")
+    kept = ("dt", "contact_time", "sleep", "box", "seed")
     case = {name: getattr(given, name) for name in kept}
     with tempfile.TemporaryDirectory() as name:
         program, folder = given.program.resolve(), Path(name)
@@ -61,7 +60,6 @@ def main() -> None:
             "dt": given.time / steps,
             "history_dt": given.dt,
             "contact_time": given.contact_time,
-            "solver": given.solver,
             "sleep": given.sleep,
             "steps": steps,
             "threads": given.threads,

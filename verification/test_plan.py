@@ -40,16 +40,13 @@ def plan_of(tmp_path: Path, blocks: str, fluid: str = "water_level = 2", sides: 
 CUBE = "&drop shape = 'cube'  position = "
 
 
-def test_contact_is_solved_as_the_physics_asks(tmp_path: Path) -> None:
-    """By impulses without a flow, by springs with one, wherever &run stands in the file."""
-    for number, (physics, first, step) in enumerate(
-        [("light", True, "contact"), ("light", False, "contact"), ("coupled", False, "body")]
-    ):
-        (folder := tmp_path / str(number)).mkdir()
-        case = BASIN.format(blocks=f"{CUBE}2, 2, 3 /", fluid="water_level = 2", sides="")
-        case = case.replace("&run", f"&run physics = '{physics}' ")
-        case = "&contact /\n" + case if first else case + "&contact /\n"
-        assert f"{step} step" in mics(["--check"], folder, case).stdout
+def test_contact_is_solved_as_the_model_asks(tmp_path: Path) -> None:
+    """By impulses between surfaces, by springs between contact spheres; nothing else is."""
+    case = BASIN.format(blocks=f"{CUBE}2, 2, 3 /", fluid="water_level = 2", sides="")
+    for model, step in ("", "contact"), ("model = 'spheres'", "body"):
+        assert f"{step} step" in mics(["--check"], tmp_path, f"{case}&contact {model} /\n").stdout
+    idle = mics(["--check"], tmp_path, case + "&contact substep_ratio = 0.1 /\n").stdout
+    assert "&contact substep_ratio: has no meaning with solver = 'impulses', passed over" in idle
 
 
 @pytest.mark.parametrize("physics", ["dry", "fluid"])

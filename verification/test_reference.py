@@ -259,7 +259,8 @@ def test_an_unknown_name_ends_the_program(schema: dict[str, Any]) -> None:
              if re.search(r"case default;?\s*error stop", body)}  # fmt: skip
     choices = {name for group in schema["$defs"].values() for name, rule in
                group["properties"].items() if "enum" in rule and name not in SIDES}  # fmt: skip
-    assert choices - stops == {"advection", "if_blocked", "release"}  # `scheme_of`; by `if`
+    # advection by `scheme_of`, the model by the solver, others by `if`
+    assert choices - stops == {"advection", "if_blocked", "release", "model"}
 
 
 @pytest.mark.parametrize(

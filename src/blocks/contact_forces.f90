@@ -4,29 +4,15 @@ module contact_forces_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair
-  use contact_detection_m, only: contact_detection_t
+  use contact_points_m, only: contact_points_t, groups_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
-  use counterparts_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
-  use contact_response_m, only: opening_speed, push_apart
+  use counterparts_m, only: counterparts_t, motion_t, wrench_t, motion_between, &
+    relative_velocity, act
+  use contact_response_m, only: response_t
+  use contact_solver_m, only: loads_t, contact_report_t, energy_in_memory
   implicit none
   private
-  public :: loads_t, contact_report_t, match_displacements, integrate_displacements, sum_forces, &
-    push_group, elastic_energy, energy_in_memory
-
-  !> Contact forces and torques on all counterparts: (3, counterparts).
-  type :: loads_t
-    real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
-    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
-  end type loads_t
-
-  !> What happened in the substeps of one fluid step.
-  type :: contact_report_t
-    integer :: substeps = 0
-    integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
-    real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
-    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a contact point [-]
-    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m]
-  end type contact_report_t
+  public :: match_displacements, integrate_displacements, sum_pairs, push_group, elastic_energy
 
   !> What the contact points of one group do along their normals.
   type :: push_t
@@ -39,15 +25,15 @@ contains
 
   !> Give each group its tangential displacement: that in memory turned into the present plane, or
   !! none yet.
-  subroutine match_displacements(detected, before, displacements)
-    type(contact_detection_t), intent(inout) :: detected
+  subroutine match_displacements(points, groups, before, displacements)
+    type(contact_points_t), intent(in) :: points
+    type(groups_t), intent(inout) :: groups
     type(displacements_t), intent(inout) :: before   !! work: displacements of the substep before
     type(displacements_t), intent(inout) :: displacements
     real(wp) :: xi(3)
     integer :: g, m, t
 
-    associate (points => detected%points, groups => detected%groups, old => before, &
-      new => displacements)
+    associate (old => before, new => displacements)
       call reserve_displacements(new%n, old)
       old%n = new%n
       old%a(:old%n) = new%a(:old%n)
@@ -79,81 +65,68 @@ contains
   end subroutine match_displacements
 
   !> Let the displacements follow the present tangential velocities for a time dt.
-  pure subroutine integrate_displacements(dt, detected, displacements)
+  pure subroutine integrate_displacements(dt, groups, counterparts, displacements)
     real(wp), intent(in) :: dt   !! [s]
-    type(contact_detection_t), intent(in) :: detected
+    type(groups_t), intent(in) :: groups
+    type(counterparts_t), intent(in) :: counterparts
     type(displacements_t), intent(inout) :: displacements
     type(motion_t) :: motion
     real(wp) :: v(3)
     integer :: g
 
-    associate (groups => detected%groups)
-      do g = 1, groups%n
-        if (begins_pair(displacements, g)) motion = motion_between(detected%counterparts, &
-                                                             displacements%a(g), displacements%b(g))
-        v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
-        displacements%xi(:, g) = displacements%xi(:, g) &
-          + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
-      end do
-    end associate
+    do g = 1, groups%n
+      if (begins_pair(displacements, g)) motion = motion_between(counterparts, displacements%a(g), &
+                                                                 displacements%b(g))
+      v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
+      displacements%xi(:, g) = displacements%xi(:, g) &
+        + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
+    end do
   end subroutine integrate_displacements
 
-  !> Contact forces and torques of this substep on the walls and the bodies that act.
+  !> Contact forces and torques of this substep, added to those on the counterparts.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
-  pure subroutine sum_forces(dt, detected, displacements, loads, report)
+  pure subroutine sum_pairs(dt, points, response, counterparts, displacements, loads, report)
     real(wp), intent(in) :: dt   !! [s]
-    type(contact_detection_t), intent(in) :: detected
+    type(contact_points_t), intent(in) :: points
+    type(response_t), intent(in) :: response
+    type(counterparts_t), intent(in) :: counterparts
     type(displacements_t), intent(inout) :: displacements
     type(loads_t), intent(inout) :: loads
     type(contact_report_t), intent(inout) :: report
-    type(motion_t) :: motion
     type(wrench_t) :: wrench
     integer :: g
 
-    loads%force(:, :0) = 0.0_wp
-    loads%torque(:, :0) = 0.0_wp
-    do g = 1, detected%acting%n
-      loads%force(:, detected%acting%body(g)) = 0.0_wp
-      loads%torque(:, detected%acting%body(g)) = 0.0_wp
+    do g = 1, response%groups%n
+      associate (a => displacements%a(g), b => displacements%b(g))
+        wrench = wrench_t()
+        call push_group(g, dt, motion_between(counterparts, a, b), points, response, &
+          displacements, wrench, report)
+        loads%force(:, a) = loads%force(:, a) + wrench%force
+        loads%force(:, b) = loads%force(:, b) - wrench%force
+        loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
+        loads%torque(:, b) = loads%torque(:, b) + wrench%torque_b
+      end associate
     end do
-    associate (n => detected%groups%n)
-      do g = 1, n
-        if (begins_pair(displacements, g)) then
-          motion = motion_between(detected%counterparts, displacements%a(g), displacements%b(g))
-          wrench = wrench_t()
-        end if
-        call push_group(g, dt, motion, detected, displacements, wrench, report)
-        if (g < n) then
-          if (.not. begins_pair(displacements, g + 1)) cycle
-        end if
-        associate (a => displacements%a(g), b => displacements%b(g))
-          loads%force(:, a) = loads%force(:, a) + wrench%force
-          loads%force(:, b) = loads%force(:, b) - wrench%force
-          loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
-          loads%torque(:, b) = loads%torque(:, b) + wrench%torque_b
-        end associate
-      end do
-    end associate
-  end subroutine sum_forces
+  end subroutine sum_pairs
 
   !> Normal and tangential forces of one group.
-  pure subroutine push_group(g, dt, motion, detected, displacements, wrench, report)
+  pure subroutine push_group(g, dt, motion, points, response, displacements, wrench, report)
     integer, intent(in) :: g
     real(wp), intent(in) :: dt   !! [s]
     type(motion_t), intent(in) :: motion
-    type(contact_detection_t), intent(in) :: detected
+    type(contact_points_t), intent(in) :: points
+    type(response_t), intent(in) :: response
     type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
     type(contact_report_t), intent(inout) :: report
     type(push_t) :: push
-    real(wp) :: v_n, opening, part, force_n, decay
+    real(wp) :: v_n, part, force_n, decay
     integer :: t
 
-    associate (points => detected%points, groups => detected%groups, r => detected%response, &
-      law => detected%law)
-      decay = 0.0_wp
+    decay = 0.0_wp
+    associate (groups => response%groups)
       do t = groups%first(g), groups%first(g + 1) - 1
         associate (point => points%item(t))
           v_n = dot_product(relative_velocity(motion, point%arm_a, point%arm_b), point%normal)
@@ -161,24 +134,20 @@ contains
           ! Time since a new contact point began up to the end of the substep, over the substep: 1/2
           ! to 3/2. Damping sets in with a jump. A contact point is seen first when bodies touch in
           ! the middle of a substep, and may have begun up to a substep before.
-          if (groups%new(g)) then
-            part = 1.0_wp
-            if (v_n < 0.0_wp) part = 0.5_wp + min(point%depth, -v_n*dt)/(-v_n*dt)
-          end if
-          opening = opening_speed(point, law%gamma_n, motion)
-          force_n = normal_force(r%elastic(t), part*r%eta(t), opening) &
-            /slowing_of(part*r%decay(t)*dt)
-          call push_apart(point, law%gamma_n, force_n, wrench)
+          if (groups%new(g) .and. v_n < 0.0_wp) part = 0.5_wp + min(point%depth, -v_n*dt)/(-v_n*dt)
+          force_n = normal_force(response%elastic(t), part*response%eta(t), v_n) &
+            /slowing_of(part*response%decay(t)*dt)
+          call act(-force_n*point%normal, point%arm_a, point%arm_b, wrench)
           report%courant_max = max(report%courant_max, abs(v_n)*dt/point%length)
           report%overlap_max = max(report%overlap_max, point%depth)
         end associate
         push%force = push%force + force_n
-        decay = max(decay, r%decay(t))
-        push%eta = max(push%eta, r%eta(t))
+        decay = max(decay, response%decay(t))
+        push%eta = max(push%eta, response%eta(t))
       end do
     end associate
     push%slowing = slowing_of(decay*dt)
-    call rub(g, push, motion, detected, displacements, wrench)
+    call rub(g, push, motion, response, displacements, wrench)
   end subroutine push_group
 
   !> Force of a dashpot at the velocity of the start of a substep over that which acts.
@@ -197,22 +166,20 @@ contains
   !!
   !! The force of the spring alone is limited too: while it slips, the displacement is what friction
   !! lets it hold, and the dashpot puts no energy into it.
-  pure subroutine rub(g, push, motion, detected, displacements, wrench)
+  pure subroutine rub(g, push, motion, response, displacements, wrench)
     integer, intent(in) :: g
     type(push_t), intent(in) :: push   !! along the normal
     type(motion_t), intent(in) :: motion
-    type(contact_detection_t), intent(in) :: detected
+    type(response_t), intent(in) :: response
     type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
     real(wp) :: v(3), f(3), f_elastic(3), k, k_n, eta, bound, size_f
-    integer :: t
 
-    associate (groups => detected%groups, law => detected%law)
-      t = groups%first(g)
-      k_n = detected%response%k(t)
-      k = law%tangential_constant(k_n, detected%points%item(t)%weight)
+    associate (groups => response%groups, law => response%law)
+      k_n = response%k(groups%first(g))
+      k = law%tangential_constant(k_n)
       displacements%k(g) = k
-      eta = law%tangential_damping(detected%points%item(t)%weight, push%eta, k, k_n)
+      eta = law%tangential_damping(push%eta, k, k_n)
       bound = push%force*merge(law%wall_friction, law%friction, displacements%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
@@ -230,34 +197,23 @@ contains
   end subroutine rub
 
   !> Energy in the normal springs at the present poses and in the tangential displacements [J].
-  pure function elastic_energy(detected, displacements, rest) result(energy)
-    type(contact_detection_t), intent(in) :: detected
+  pure function elastic_energy(n, response, displacements, rest) result(energy)
+    integer, intent(in) :: n                !! contact points
+    type(response_t), intent(in) :: response
     type(displacements_t), intent(in) :: displacements, rest
       !! of contact points at work, of those at rest
     real(wp) :: energy
     integer :: t, g
 
     energy = 0.0_wp
-    do t = 1, detected%points%n
-      energy = energy + detected%response%energy(t)
+    do t = 1, n
+      energy = energy + response%energy(t)
     end do
     do g = 1, displacements%n
-      energy = energy + stored_energy(displacements%k(g), detected%law%gamma_t, &
+      energy = energy + stored_energy(displacements%k(g), response%law%gamma_t, &
         norm(displacements%xi(:, g)))
     end do
     energy = energy + energy_in_memory(rest)
   end function elastic_energy
-
-  !> Energy of contact points whose energy is remembered [J].
-  pure function energy_in_memory(displacements) result(energy)
-    type(displacements_t), intent(in) :: displacements
-    real(wp) :: energy
-    integer :: g
-
-    energy = 0.0_wp
-    do g = 1, displacements%n
-      energy = energy + displacements%energy(g)
-    end do
-  end function energy_in_memory
 
 end module contact_forces_m

@@ -36,13 +36,13 @@ module contact_law_m
     !> Stiffness over that where the contact point begins of the linear spring of the same force and
     !! energy.
     real(wp) :: hardness = 1.0_wp          !! [-]
-    !> dF/dd over w k `hardness`; where nothing touches yet, as where it begins.
+    !> dF/dd over k `hardness`; where nothing touches yet, as where it begins.
     real(wp) :: steepness = 1.0_wp         !! [m^(gamma-1)]
   end type stiffness_t
 
   abstract interface
-    !> Constant k_n of a contact point of weight one: the same whatever else touches, so that the
-    !! elastic energy is a function of position only.
+    !> Constant k_n of a contact point: the same whatever else touches, so that the elastic energy
+    !! is a function of position only.
     elemental function normal_constant_i(law, reduced_mass, load, gravity, rest_overlap) result(k)
       import :: contact_law_t, wp
       implicit none
@@ -55,12 +55,11 @@ module contact_law_m
     end function normal_constant_i
 
     !> The elastic force of a contact point at its depth.
-    elemental subroutine normal_stiffness_i(law, k, weight, d, hard, elastic)
+    elemental subroutine normal_stiffness_i(law, k, d, hard, elastic)
       import :: contact_law_t, stiffness_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: k               !! where the spring begins, at weight one [N/m^gamma]
-      real(wp), intent(in) :: weight          !! of the contact point [-]
+      real(wp), intent(in) :: k               !! where the spring begins [N/m^gamma]
       real(wp), intent(in) :: d, hard         !! overlap, depth d_h at which contacts harden [m]
       type(stiffness_t), intent(out) :: elastic
     end subroutine normal_stiffness_i
@@ -71,8 +70,8 @@ module contact_law_m
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: share
-        !! stiffness of the contact point over k: weight times hardness [-]
-      real(wp), intent(in) :: k         !! of weight one [N/m^gamma_n]
+        !! stiffness of the contact point over k: its hardness [-]
+      real(wp), intent(in) :: k         !! where the spring begins [N/m^gamma_n]
       real(wp), intent(in) :: total     !! sum of the shares of the pair along the normal [-]
       real(wp), intent(in) :: inverse   !! of the mass of the pair there [1/kg]
       real(wp), intent(out) :: eta      !! of the contact point [N s/m]
@@ -83,24 +82,22 @@ module contact_law_m
 contains
 
   !> Constant k_t of a contact point whose normal constant is k_n.
-  elemental function tangential_constant(law, k_n, weight) result(k)
+  elemental function tangential_constant(law, k_n) result(k)
     class(contact_law_t), intent(in) :: law
     real(wp), intent(in) :: k_n      !! of the contact point [N/m^gamma_n]
-    real(wp), intent(in) :: weight   !! of the contact point [-]
     real(wp) :: k                    !! [N/m^gamma_t]
 
-    k = law%tangential_share*k_n + weight*law%k_t
+    k = law%tangential_share*k_n + law%k_t
   end function tangential_constant
 
   !> Tangential damping of a contact point [N s/m].
-  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
+  elemental function tangential_damping(law, eta_n, k_t, k_n) result(eta)
     class(contact_law_t), intent(in) :: law
-    real(wp), intent(in) :: weight    !! of the contact point [-]
     real(wp), intent(in) :: eta_n     !! along the normal [N s/m]
     real(wp), intent(in) :: k_t, k_n  !! of the contact point [N/m^gamma]
     real(wp) :: eta
 
-    eta = weight*law%eta_t
+    eta = law%eta_t
     if (law%tangential_share > 0.0_wp) eta = eta_n*(k_t/k_n)
   end function tangential_damping
 

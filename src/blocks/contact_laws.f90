@@ -40,7 +40,7 @@ contains
     hard = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
   end function hard_depth
 
-  !> Depth at which the spring of a contact point of weight one holds a force, by bisection [m].
+  !> Depth at which the spring of a contact point holds a force, by bisection [m].
   pure function depth_at_rest(law, k, hard, force) result(depth)
     class(contact_law_t), intent(in) :: law
     real(wp), intent(in) :: k       !! of the law, `normal_constant` [N/m^gamma]
@@ -57,13 +57,13 @@ contains
     low = 0.0_wp
     high = hard
     do   ! ends: the force grows at least as the depth does
-      call law%normal_stiffness(k, 1.0_wp, high, hard, elastic)
+      call law%normal_stiffness(k, high, hard, elastic)
       if (elastic%force >= force) exit
       high = 2*high
     end do
     do i = 1, halvings
       depth = 0.5_wp*(low + high)
-      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      call law%normal_stiffness(k, depth, hard, elastic)
       if (elastic%force < force) then
         low = depth
       else

@@ -7,7 +7,7 @@ module contact_points_m
   use vectors_m, only: norm
   implicit none
   private
-  public :: contact_point_t, contact_points_t, ensure_points, add_point, set_apart
+  public :: contact_point_t, contact_points_t, ensure_points, add_point, keep_touching
   public :: groups_t, form_groups
 
   !> A contact point of body a and its counterpart b, which has a lower number: another body, a wall
@@ -19,11 +19,9 @@ module contact_points_m
     real(wp) :: arm_b(3) = 0.0_wp            !! from the (image of the) centre of b [m]
     real(wp) :: normal(3) = 0.0_wp           !! unit vector from a to b [-]
     real(wp) :: depth = 0.0_wp               !! overlap d_n, > 0 where bodies touch [m]
-    real(wp) :: weight = 1.0_wp              !! share of the stiffness of the law [-]
+    real(wp) :: weight = 1.0_wp              !! share of the stiffness [-]
     real(wp) :: length = 0.0_wp              !! d_s of the contact Courant number, eq. (6) [m]
-    !> Relative change of the weight with a shift of a, and with a turn about the contact.
-    real(wp) :: weight_shift(3) = 0.0_wp, weight_turn(3) = 0.0_wp   !! [1/m], [1/rad]
-    integer :: other = 0                     !! edge of b that crosses that of the id
+    integer :: other = 0                     !! edge or facet of b, for edges and balls
   end type contact_point_t
 
   !> Contact points of one moment, sorted by a, then b, then id.
@@ -67,24 +65,19 @@ contains
     points%item(points%n) = point
   end subroutine add_point
 
-  !> Keep in a list the entries in which the bodies touch, and move the others to a list of their
-  !! own; both stay sorted.
-  pure subroutine set_apart(points, soon)
-    type(contact_points_t), intent(inout) :: points, soon
+  !> Leave out what does not touch yet.
+  pure subroutine keep_touching(points)
+    type(contact_points_t), intent(inout) :: points
     integer :: t, kept
 
-    soon%n = 0
     kept = 0
     do t = 1, points%n
-      if (points%item(t)%depth <= 0.0_wp) then
-        call add_point(points%item(t), soon)
-      else
-        kept = kept + 1
-        if (kept < t) points%item(kept) = points%item(t)
-      end if
+      if (points%item(t)%depth <= 0.0_wp) cycle
+      kept = kept + 1
+      if (kept < t) points%item(kept) = points%item(t)
     end do
     points%n = kept
-  end subroutine set_apart
+  end subroutine keep_touching
 
   !> Gather the contact points of each id and counterpart.
   pure subroutine form_groups(points, groups)
@@ -129,7 +122,7 @@ contains
     normal = 0.0_wp
     arm_a = 0.0_wp
     do i = 1, size(point)
-      w = point(i)%weight*point(i)%depth
+      w = point(i)%depth
       total = total + w
       normal = normal + w*point(i)%normal
       arm_a = arm_a + w*point(i)%arm_a

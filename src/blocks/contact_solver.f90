@@ -10,12 +10,33 @@ module contact_solver_m
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use sleep_m, only: sleep_t, sleep_init, sum_memory
   use lubrication_m, only: lubrication_t
-  use contact_detection_m, only: contact_detection_t, detection_init
-  use contact_forces_m, only: loads_t, contact_report_t, energy_in_memory
-  use substep_limits_m, only: longest_substep_of
+  use contact_points_m, only: contact_points_t, ensure_points
+  use counterparts_m, only: counterparts_t, counterparts_init
   implicit none
   private
-  public :: contact_solver_t, start_solver, met_t, store_counterparts
+  public :: contact_solver_t, loads_t, contact_report_t, start_solver, met_t, store_counterparts
+  public :: list_bodies, equal_substep, energy_in_memory
+
+  !> Contact forces and torques on all counterparts: (3, counterparts).
+  type :: loads_t
+    real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
+  end type loads_t
+
+  !> What happened in the substeps of one fluid step.
+  type :: contact_report_t
+    integer :: substeps = 0
+    integer :: info = 0                 !! 1: it would take too many, or NaN
+    real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
+    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a contact point [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m]
+  end type contact_report_t
+
+  !> Some of the bodies: those that a substep may move or wake.
+  type :: acting_t
+    integer :: n = 0
+    integer, allocatable :: body(:)              !! (n) rising
+  end type acting_t
 
   !> Pairs that touched, sorted.
   type :: met_t
@@ -24,7 +45,10 @@ module contact_solver_m
   end type met_t
 
   type, abstract :: contact_solver_t
-    type(contact_detection_t) :: detected        !! what touches now
+    logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
+    type(counterparts_t) :: counterparts
+    type(contact_points_t) :: points             !! what touches now
+    type(acting_t) :: acting
     type(displacements_t) :: displacements       !! the memory: part of the state of a run
     logical :: warm_start = .false.              !! it has the forces too: a solution begins there
     type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
@@ -69,18 +93,21 @@ module contact_solver_m
 contains
 
   !> What is common to all solvers.
-  subroutine start_solver(input, blocks, contacts)
+  subroutine start_solver(input, blocks, bounding_radius, contacts)
     type(contact_input_t), intent(in) :: input
     type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: bounding_radius(:)   !! (n) farthest point that touches [m]
     class(contact_solver_t), intent(inout) :: contacts
 
-    call detection_init(input, longest_substep_of(input), blocks, contacts%detected)
+    call counterparts_init(blocks, contacts%counterparts)
+    allocate (contacts%acting%body(blocks%n), source=0)
+    call ensure_points(1, contacts%points)
     associate (loads => contacts%loads, n => blocks%n)
       allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
         loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), source=0.0_wp)
       allocate (contacts%share(n), contacts%steady(6, n), source=0.0_wp)
     end associate
-    call sleep_init(input%sleep, contacts%detected%bounding_radius, contacts%sleep)
+    call sleep_init(input%sleep, bounding_radius, contacts%sleep)
     call reserve_displacements(1, contacts%displacements)
   end subroutine start_solver
 
@@ -159,5 +186,39 @@ contains
       met%n = met%n + 1
     end do
   end subroutine store_counterparts
+
+  !> List the bodies chosen.
+  pure subroutine list_bodies(chosen, acting)
+    logical, intent(in) :: chosen(:)   !! (bodies)
+    type(acting_t), intent(inout) :: acting
+    integer :: b
+
+    acting%n = 0
+    do b = 1, size(chosen)
+      if (.not. chosen(b)) cycle
+      acting%n = acting%n + 1
+      acting%body(acting%n) = b
+    end do
+  end subroutine list_bodies
+
+  !> An equal part of the time left, no longer than allowed [s].
+  pure function equal_substep(left, longest) result(dt_b)
+    real(wp), intent(in) :: left, longest   !! [s]
+    real(wp) :: dt_b
+
+    dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
+  end function equal_substep
+
+  !> Energy of contact points whose energy is remembered [J].
+  pure function energy_in_memory(displacements) result(energy)
+    type(displacements_t), intent(in) :: displacements
+    real(wp) :: energy
+    integer :: g
+
+    energy = 0.0_wp
+    do g = 1, displacements%n
+      energy = energy + displacements%energy(g)
+    end do
+  end function energy_in_memory
 
 end module contact_solver_m

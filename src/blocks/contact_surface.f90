@@ -3,15 +3,13 @@
 !! A vertex of one body (see `surface_features_m`) touches where it is inside the other; its depth
 !! is its distance from the surface of the other. A sharp edge touches an edge of the other where
 !! the two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
-!! points that carry it. Each depth has a fixed weight: the elastic energy is a function of
-!! position. Spheres touch as spheres, at one point.
+!! points that carry it. Spheres touch as spheres, wherever a place is nearer than all around it.
 !!
 !! Pairs of bodies keep a list of the features that may touch until they have moved against one
 !! another by a skin (`near_features_m`), and a short one of those that may touch soon
 !! (`short_list_m`). What comes out, and its order, do not depend on when the lists were made.
 !!
-!! With a margin (impulses) only what comes near by its own motion counts as a contact point to
-!! come.
+!! Of what comes near, only what does so by its own motion counts as a contact point to come.
 module contact_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
@@ -24,7 +22,7 @@ module contact_surface_m
   use displacements_m, only: comes_before
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface, nearest_places
-  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
+  use edge_crossing_m, only: edge_t, crossing_t, cross_edges
   use near_features_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes, &
     near_features_t, search_t, list_features, list_bed, edge_in_view
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
@@ -43,7 +41,6 @@ module contact_surface_m
   type :: contact_surface_t
     type(surface_t), allocatable :: surface(:)   !! (shapes)
     real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
-    real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
     real(wp) :: listed_skin = 0.0_wp             !! of the present list [m]
@@ -64,19 +61,20 @@ module contact_surface_m
     integer, allocatable :: state(:)             !! (bodies) of which they are, see `state_of`
   end type contact_surface_t
 
-  real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
-  integer, parameter :: lasting_substeps = 10    !! that lists of fast bodies last
+  real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest `length`
+  real(wp), parameter :: min_ahead = 0.1_wp      !! least way of a contact point to come, likewise
+  real(wp), parameter :: lasting_steps = 2.0_wp  !! contact times that lists of fast bodies last
   real(wp), parameter :: wide_share = 0.2_wp
     !! skin of the pairs over the largest bounding radius
 
 contains
 
   !> Make the features of all shapes and size the lists.
-  subroutine contact_surface_init(courant_max, longest_substep, blocks, self)
-    real(wp), intent(in) :: courant_max   !! C_s of eq. (6): bodies move less in a substep, over d_s
-    real(wp), intent(in) :: longest_substep   !! [s]
+  subroutine contact_surface_init(contact_time, blocks, self)
+    real(wp), intent(in) :: contact_time   !! [s]
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(out) :: self
+    real(wp) :: smallest
     integer :: s, b
 
     allocate (self%surface(size(blocks%shapes)))
@@ -87,18 +85,18 @@ contains
     allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
     allocate (self%pairs(0), self%with_bed(blocks%n))
     allocate (self%state(blocks%n), source=0)
-    self%smallest = huge(1.0_wp)
+    smallest = huge(1.0_wp)
     do b = 1, blocks%n
       self%bounding_radius(b) = self%surface(blocks%shape(b))%bounding_radius
-      self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
+      smallest = min(smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
       self%with_bed(b)%b = bed_counterpart
       allocate (self%with_bed(b)%near, self%with_bed(b)%close)
     end do
     if (blocks%n == 0) return
-    self%search%skin = skin_share*self%smallest
-    self%search%lasting = real(lasting_substeps, wp)*longest_substep
-    self%search%min_ahead = courant_max*self%smallest
+    self%search%skin = skin_share*smallest
+    self%search%lasting = lasting_steps*contact_time
+    self%search%min_ahead = min_ahead*smallest
     call cover_way(max(0.5_wp*wide_share*maxval(self%bounding_radius), self%search%min_ahead), self)
   end subroutine contact_surface_init
 
@@ -386,7 +384,7 @@ contains
   !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
   !! (the host).
   !!
-  !! With a margin, a point inside a flat face of the guest may come only to a surface that the face
+  !! A point inside a flat face of the guest may come only to a surface that the face
   !! looks at: else, level with the edge of a face ahead, it would hold a body that slides over it.
   subroutine add_vertex_points(guest_is_a, now, guest, host, pair, points)
     logical, intent(in) :: guest_is_a
@@ -430,7 +428,7 @@ contains
           apart, outward)
       end associate
       if (apart >= now%gap) cycle
-      if (now%margin > 0.0_wp .and. i > guest%n_corners) then
+      if (i > guest%n_corners) then
         if (.not. dot_product(matmul(view%turn, guest%facing(:, i)), outward) < max_cosine) cycle
       end if
       call add_place(apart, outward)
@@ -477,8 +475,8 @@ contains
         point%arm_a = arm
         point%arm_b = arm - now%to_b
       end if
-      if (closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) &
-        call add_point(point, points)
+      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) return
+      call add_point(point, points)
     end subroutine add_place
 
   end subroutine add_vertex_points
@@ -492,7 +490,7 @@ contains
     type(edge_t) :: guest
     type(crossing_t) :: crossing
     type(contact_point_t) :: point
-    real(wp) :: arm(3), with_shift(3), with_turn(3)
+    real(wp) :: arm(3)
     integer :: m, i, j, last
 
     last = 0
@@ -512,11 +510,6 @@ contains
       point%depth = crossing%depth
       point%weight = crossing%weight
       if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
-      if (crossing%weight < 1.0_wp .and. crossing%depth > 0.0_wp) then
-        call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
-        point%weight_shift = matmul(now%turn_b, with_shift)
-        point%weight_turn = matmul(now%turn_b, with_turn)
-      end if
       call add_point(point, points)
     end do
   end subroutine add_edge_points

@@ -8,8 +8,7 @@ module contacts_m
   use bed_m, only: bed_counterpart
   use sleep_m, only: update_stillness, store_quiet, all_still
   use counterparts_m, only: update_counterparts
-  use contact_forces_m, only: contact_report_t
-  use contact_solver_m, only: contact_solver_t
+  use contact_solver_m, only: contact_solver_t, contact_report_t
   use resting_m, only: wake_or_sleep, restore_contacts
   use springs_m, only: springs_t
   use impulse_step_m, only: impulses_t
@@ -91,7 +90,7 @@ contains
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
     contacts%met%n = 0
-    call update_counterparts(walls, gravity, blocks, contacts%detected%counterparts)
+    call update_counterparts(walls, gravity, blocks, contacts%counterparts)
     if (.not. contacts%sleep%active) return
     contacts%sleep%x = blocks%x
     contacts%sleep%q = blocks%q

@@ -7,13 +7,13 @@
 module impulse_rows_m
   use kinds_m, only: wp, i8, pi
   use growing_m, only: ensure_capacity
+  use case_types_m, only: contact_input_t
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use counterparts_m, only: counterparts_t
-  use contact_detection_m, only: contact_detection_t
   implicit none
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
@@ -40,6 +40,8 @@ module impulse_rows_m
   end type row_t
 
   type :: rows_t
+    real(wp) :: friction = 0.0_wp, wall_friction = 0.0_wp   !! Coulomb, block on block, on wall [-]
+    real(wp) :: contact_time = 0.0_wp             !! [s]
     integer :: n = 0
     type(row_t), allocatable :: row(:)
     integer, allocatable :: point(:)              !! (n) number in the list of contact points
@@ -94,10 +96,14 @@ module impulse_rows_m
 contains
 
   !> Room for the counterparts of a case.
-  subroutine rows_init(n, rows)
+  subroutine rows_init(input, n, rows)
+    type(contact_input_t), intent(in) :: input
     integer, intent(in) :: n                      !! bodies
     type(rows_t), intent(out) :: rows
 
+    rows%friction = input%friction
+    rows%wall_friction = input%wall_friction
+    rows%contact_time = input%contact_time
     allocate (rows%v(6, bed_counterpart:n), rows%v_start(6, bed_counterpart:n), source=0.0_wp)
     allocate (rows%way(6, bed_counterpart:n), rows%a_free(6, bed_counterpart:n), &
       rows%by_contact(6, bed_counterpart:n), rows%inverse_mass(bed_counterpart:n), &
@@ -115,24 +121,24 @@ contains
   !! least as stiff as holds the force F of the last step at a small overlap d, w^2 = F/(m_n d);
   !! damped so much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto,
   !! Solver2D (2024).
-  subroutine make_rows(h, contact_time, detected, blocks, memory, rows)
+  subroutine make_rows(h, points, counterparts, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
-    real(wp), intent(in) :: contact_time          !! [s]
-    type(contact_detection_t), intent(in) :: detected
+    type(contact_points_t), intent(in) :: points
+    type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
     type(displacements_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
     integer :: t, m, r, b
 
-    call copy_counterparts(detected%counterparts, blocks, rows)
-    call reserve_rows(detected%points%n, rows)
+    call copy_counterparts(counterparts, blocks, rows)
+    call reserve_rows(points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
     rows%hard = .false.
     m = 1
-    do t = 1, detected%points%n
-      associate (point => detected%points%item(t), law => detected%law)
+    do t = 1, points%n
+      associate (point => points%item(t))
         if (point%weight < min_weight) cycle
         r = rows%n + 1
         rows%n = r
@@ -141,11 +147,11 @@ contains
         rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
           gap=-point%depth, gap_start=-point%depth, &
           lever_a=cross(point%arm_a, point%normal), lever_b=cross(point%arm_b, point%normal), &
-          friction=merge(law%wall_friction, law%friction, point%b < 0))
-        call weigh(point%a, point%b, detected%counterparts, rows, rows%row(r))
+          friction=merge(rows%wall_friction, rows%friction, point%b < 0))
+        call weigh(point%a, point%b, counterparts, rows, rows%row(r))
         call recall(point, h, memory, m, rows%row(r))
         associate (row => rows%row(r))
-          w = sqrt(max(point%weight*(2*pi/contact_time)**2, &
+          w = sqrt(max(point%weight*(2*pi/rows%contact_time)**2, &
             row%impulse(1)/(h*row%mass*sinking*point%length)))
           a1 = 2*damping_ratio + h*w
           a2 = h*w*a1

@@ -10,15 +10,14 @@ module impulse_step_m
   use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body, haste, change_by_motion
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart, bed_is_near, bed_place
-  use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points, &
+    cover_way, renew_pairs
   use counterparts_m, only: update_motion, update_inertia
-  use contact_forces_m, only: contact_report_t
-  use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
-  use substep_limits_m, only: equal_substep
+  use contact_solver_m, only: contact_solver_t, contact_report_t, start_solver, equal_substep, &
+    list_bodies, store_counterparts
   use impulse_rows_m, only: rows_t, rows_init, make_rows, store_memory, sum_loads
   use impulse_sweeps_m, only: solve_rows
   use lubrication_m, only: lubricate
-  use contact_detection_m, only: list_bodies
   use resting_m, only: hold_or_wake, restore_contacts
   implicit none
   private
@@ -35,6 +34,7 @@ module impulse_step_m
   real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
   type, extends(contact_solver_t) :: impulses_t
+    type(contact_surface_t) :: surface
     type(rows_t) :: rows
     real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films of liquid [N]
     real(wp), allocatable :: gain(:)         !! (n) work: speed gained in free fall [m/s]
@@ -54,18 +54,16 @@ contains
     class(impulses_t), intent(inout) :: contacts
     integer :: b
 
-    call start_solver(input, blocks, contacts)
+    call contact_surface_init(input%contact_time, blocks, contacts%surface)
+    call start_solver(input, blocks, contacts%surface%bounding_radius, contacts)
+    contacts%exact = .true.
     contacts%warm_start = .true.
-    call rows_init(blocks%n, contacts%rows)
+    call rows_init(input, blocks%n, contacts%rows)
     allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
     contacts%contact_time = input%contact_time
     contacts%restitution = input%restitution
     if (blocks%n > 0) contacts%smallest_edge &
       = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
-    associate (search => contacts%detected%surface%search)
-      search%lasting = 2*input%contact_time   ! lists of fast bodies: two steps
-      search%lasting_gaps = 1.0_wp
-    end associate
   end subroutine init
 
   !> Move the blocks through a fluid step; impulses of contact are added to the loads of the step.
@@ -125,7 +123,7 @@ contains
       end if
       contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(1:3, b)/blocks%mass(b)), &
                                blocks%fixed(b))*left &
-        + haste(blocks, b, contacts%detected%surface%bounding_radius(b))
+        + haste(blocks, b, contacts%surface%bounding_radius(b))
       speed = fastest(b)
       if (.not. speed <= two(2)) two(2) = speed
       if (.not. two(2) <= two(1)) two = two([2, 1])
@@ -133,7 +131,7 @@ contains
     most = sum(two)
     longest = 0.0_wp
     if (.not. most <= huge(most)) return   ! not a number
-    associate (s => contacts%detected%surface)
+    associate (s => contacts%surface)
       edge = contacts%smallest_edge
       longest = left
       if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
@@ -172,7 +170,7 @@ contains
       integer, intent(in) :: b
 
       fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, &
-        b))*contacts%detected%surface%bounding_radius(b) + contacts%gain(b)
+        b))*contacts%surface%bounding_radius(b) + contacts%gain(b)
     end function fastest
 
     !> What a gap allows that closes at a speed.
@@ -196,20 +194,21 @@ contains
     type(impulses_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp) :: by_film(3)
-    integer :: k
+    integer :: k, asked
 
-    associate (detected => contacts%detected, rows => contacts%rows, loads => contacts%loads)
-      detected%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
-      call find_surface_points(walls, blocks, step, detected%surface, detected%points)
-      call list_bodies(blocks%present, detected%acting)
-      associate (there => detected%acting%body(:detected%acting%n))
-        call update_motion(blocks, there, detected%counterparts)
-        call update_inertia(blocks, there, detected%counterparts)
+    associate (surface => contacts%surface, rows => contacts%rows, loads => contacts%loads)
+      surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
+      call find_surface_points(walls, blocks, step, surface, contacts%points)
+      call list_bodies(blocks%present, contacts%acting)
+      associate (there => contacts%acting%body(:contacts%acting%n))
+        call update_motion(blocks, there, contacts%counterparts)
+        call update_inertia(blocks, there, contacts%counterparts)
       end associate
       contacts%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
         contacts%lubrication, contacts%film)
-      call make_rows(h, contacts%contact_time, detected, blocks, contacts%displacements, rows)
+      call make_rows(h, contacts%points, contacts%counterparts, blocks, &
+        contacts%displacements, rows)
       if (rows%n > 0) then
         ! Accelerations of all bodies with rows but for contact, at the start of the step.
         do k = 1, rows%n_active
@@ -225,9 +224,10 @@ contains
               contacts%steady(4:6, b) - cross(blocks%omega(:, b), blocks%l(:, b)))
           end associate
         end do
+        asked = n
         call solve_rows(h, max_opening*contacts%smallest_edge/contacts%contact_time, &
           contacts%restitution, slow_hit*norm(gravity)*step, n, rows)
-        step = h*real(n, wp)
+        if (n < asked) step = h*real(n, wp)   ! else rounding would leave a step of no length
       end if
       call sum_loads(step, rows, loads%force, loads%torque)
       loads%force = loads%force + contacts%film
@@ -268,13 +268,13 @@ contains
           do r = first, last
             report%overlap_max = max(report%overlap_max, -rows%row(r)%gap_start)
             if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
-              abs(rows%closing(r))*step/contacts%detected%points%item(rows%point(r))%length)
+              abs(rows%closing(r))*step/contacts%points%item(rows%point(r))%length)
           end do
         end associate
       end do
       call store_counterparts(pack(rows%a(:rows%n_pairs), touched), pack(rows%b(:rows%n_pairs), &
         touched), contacts%met)
-      call store_memory(h, contacts%detected%points, rows, contacts%displacements)
+      call store_memory(h, contacts%points, rows, contacts%displacements)
     end associate
   end subroutine finish_step
 

@@ -40,10 +40,10 @@ contains
     k = law%k_n
   end function normal_constant
 
-  !> F = w k d^gamma of eq. (1) for the weight w.
-  elemental subroutine normal_stiffness(law, k, weight, d, hard, elastic)
+  !> F = k d^gamma of eq. (1).
+  elemental subroutine normal_stiffness(law, k, d, hard, elastic)
     class(law_constants_t), intent(in) :: law
-    real(wp), intent(in) :: k, weight, d, hard
+    real(wp), intent(in) :: k, d, hard
     type(stiffness_t), intent(out) :: elastic
 
     associate (unused => hard)   ! these springs do not harden
@@ -52,7 +52,7 @@ contains
       elastic%steepness = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
     end if
     if (.not. d > 0.0_wp) return
-    elastic%force = weight*k*power(d, law%gamma_n)
+    elastic%force = k*power(d, law%gamma_n)
     elastic%energy = energy_of_force(elastic%force, law%gamma_n, d)
   end subroutine normal_stiffness
 

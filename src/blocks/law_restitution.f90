@@ -108,27 +108,27 @@ contains
 
   !> The spring is that of the energy
   !!
-  !! $$ E = \frac{k}{2} s^2, \qquad s = u \Big( 1 + \frac{1}{5} (u/d_h)^4 \Big), \qquad
-  !!    u = d \sqrt{w}, \qquad F = k s \frac{ds}{dd}: $$
+  !! $$ E = \frac{k}{2} s^2, \qquad s = d \Big( 1 + \frac{1}{5} (d/d_h)^4 \Big), \qquad
+  !!    F = k s \frac{ds}{dd}: $$
   !!
   !! linear as long as the depth is below half of d_h, so that the contact time is that asked for,
   !! and so hard beyond that no block comes out of another one on the wrong side. With the damping
   !! eta ds/dd an impact is that of the linear spring in the variable s and the time t ds/dd: it
   !! returns the restitution asked for at every speed.
-  elemental subroutine normal_stiffness(law, k, weight, d, hard, elastic)
+  elemental subroutine normal_stiffness(law, k, d, hard, elastic)
     class(law_restitution_t), intent(in) :: law
-    real(wp), intent(in) :: k, weight, d, hard
+    real(wp), intent(in) :: k, d, hard
     type(stiffness_t), intent(out) :: elastic
-    real(wp) :: h   ! how far into the range where it hardens: (u/d_h)^4 [-]
+    real(wp) :: h   ! how far into the range where it hardens: (d/d_h)^4 [-]
 
     associate (unused => law)
     end associate
-    h = (weight*(max(0.0_wp, d)/hard)**2)**2
-    elastic%hardness = (1.0_wp + h)**2   ! the square of ds/du
+    h = (max(0.0_wp, d)/hard)**4
+    elastic%hardness = (1.0_wp + h)**2   ! the square of ds/dd
     elastic%steepness = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
     if (.not. d > 0.0_wp) return
-    elastic%force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
-    elastic%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
+    elastic%force = k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
+    elastic%energy = 0.5_wp*k*(d*(1.0_wp + 0.2_wp*h))**2
   end subroutine normal_stiffness
 
   !> The share of a contact point in the damping of the pair, whose ratio is that of the impact.

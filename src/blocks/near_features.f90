@@ -72,7 +72,6 @@ module near_features_m
       !! way of a contact point that comes soon, at least [m],
     real(wp) :: ahead = 0.0_wp                   !! and of the pair whose lists are made [m]
     real(wp) :: margin = 0.0_wp                  !! added to all gaps [m]
-    real(wp) :: lasting_gaps = 10.0_wp           !! multiple of the gap for which short lists hold
     type(near_list_t) :: guests, hosts
     type(found_t) :: found
   end type search_t
@@ -403,7 +402,7 @@ contains
     logical :: yes
     real(wp) :: closing(3)
 
-    yes = depth > 0.0_wp .or. now%margin <= 0.0_wp
+    yes = depth > 0.0_wp
     if (yes) return
     closing = now%v + cross(now%omega_a, arm_a) - cross(now%omega_b, arm_b)
     yes = depth + now%margin + now%ahead*dot_product(normal, closing) > 0.0_wp

@@ -7,8 +7,7 @@ module resting_m
   use sleep_m, only: update_loads, may_sleep, balanced, rest_tolerance, wake_tolerance, &
     put_to_sleep, wake, all_still
   use counterparts_m, only: counterparts_t
-  use contact_detection_m, only: list_bodies
-  use contact_solver_m, only: contact_solver_t, store_counterparts
+  use contact_solver_m, only: contact_solver_t, list_bodies, store_counterparts
   implicit none
   private
   public :: wake_or_sleep, hold_or_wake, restore_contacts
@@ -30,7 +29,7 @@ contains
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      call list_bodies(blocks%present, contacts%detected%acting)
+      call list_bodies(blocks%present, contacts%acting)
       call hold_or_wake(gravity, contacts, blocks, changed)
       if (changed) call restore_contacts(blocks, contacts)
     else
@@ -63,7 +62,7 @@ contains
     integer :: k
 
     woke = .false.
-    associate (acting => contacts%detected%acting, loads => contacts%loads, &
+    associate (acting => contacts%acting, loads => contacts%loads, &
                sleep => contacts%sleep)
       do k = 1, acting%n
         associate (b => acting%body(k))
@@ -99,12 +98,12 @@ contains
     logical :: supported(blocks%n)
     integer :: g, b
 
-    associate (displacements => contacts%displacements, detected => contacts%detected)
+    associate (displacements => contacts%displacements)
       do g = 1, displacements%n
         associate (a => displacements%a(g), c => displacements%b(g))
-          if (is_carried(blocks, detected%counterparts, c)) candidate(a) = .false.
+          if (is_carried(blocks, contacts%counterparts, c)) candidate(a) = .false.
           if (c < 1) cycle
-          if (is_carried(blocks, detected%counterparts, a)) candidate(c) = .false.
+          if (is_carried(blocks, contacts%counterparts, a)) candidate(c) = .false.
         end associate
       end do
       supported = blocks%fixed .or. blocks%asleep

@@ -62,7 +62,7 @@ contains
     short%when = now%poses
     short%left = near%valid - way
     short%ahead = near%ahead
-    short%until = now%gap + max(share*search%skin, search%lasting_gaps*now%gap)
+    short%until = now%gap + max(share*search%skin, now%gap)
     short%n = 0
     call choose_vertices(now%b_in_a, way, surface_b, surface_a, near%of_b, short, n)
     short%n_of_b = n

@@ -5,30 +5,38 @@
 module springs_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t, is_given
-  use vectors_m, only: norm
-  use rigid_body_m, only: blocks_t, drift, kick_body
+  use vectors_m, only: distance, norm
+  use rigid_body_m, only: blocks_t, drift, kick_body, haste
   use walls_m, only: walls_t
+  use bed_m, only: bed_is_near, bed_place
   use sleep_m, only: put_to_sleep
   use lubrication_m, only: lubricate
-  use counterparts_m, only: wrench_t, update_motion, motion_between
+  use counterparts_m, only: wrench_t, update_motion, update_inertia, motion_between
   use displacements_m, only: displacements_t, reserve_displacements
+  use contact_points_m, only: form_groups, keep_touching
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
   use contact_law_m, only: stored_energy
-  use contact_detection_m, only: detect_contacts, list_bodies
-  use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
-    sum_forces, push_group, elastic_energy
-  use substep_limits_m, only: longest_substep_of, substep_limit, stiffness_limit, equal_substep
-  use contact_solver_m, only: contact_solver_t, start_solver, store_counterparts
+  use contact_laws_m, only: choose_law
+  use contact_response_m, only: response_t, respond, stiffness_limit
+  use contact_forces_m, only: match_displacements, integrate_displacements, sum_pairs, push_group, &
+    elastic_energy
+  use contact_solver_m, only: contact_solver_t, contact_report_t, start_solver, equal_substep, &
+    list_bodies, store_counterparts
   use resting_m, only: hold_or_wake, restore_contacts
   implicit none
   private
   public :: springs_t
 
+  real(wp), parameter :: substeps_per_contact = 20.0_wp   !! at least
   integer, parameter :: max_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
   type, extends(contact_solver_t) :: springs_t
+    type(contact_spheres_t) :: spheres
+    type(response_t) :: response
     real(wp) :: substep_ratio = 1.0_wp           !! longest substep over the fluid step [-]
-    real(wp) :: longest_substep = 0.0_wp         !! [s]
+    real(wp) :: contact_time = 0.0_wp            !! [s]
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
+    real(wp) :: stiffness_limit = 0.0_wp         !! longest substep for all springs [s]
     type(displacements_t) :: before              !! work: displacements of the substep before
     real(wp), allocatable :: support(:, :)
       !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
@@ -52,8 +60,10 @@ contains
     class(springs_t), intent(inout) :: contacts
     integer :: n
 
-    call start_solver(input, blocks, contacts)
-    contacts%longest_substep = longest_substep_of(input)
+    call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
+    call start_solver(input, blocks, contacts%spheres%bounding_radius, contacts)
+    call choose_law(input, contacts%response%law)
+    contacts%contact_time = input%contact_time
     contacts%courant_max = input%courant_max
     if (is_given(input%substep_ratio)) contacts%substep_ratio = input%substep_ratio
     call reserve_displacements(1, contacts%before)
@@ -62,13 +72,45 @@ contains
       contacts%omega(3, n), contacts%lost(3, n), source=0.0_wp)
   end subroutine init
 
+  !> Find what touches at the present poses.
   subroutine detect(walls, contacts, blocks)
     type(walls_t), intent(in) :: walls
     class(springs_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
 
-    call detect_contacts(walls, blocks, 0.0_wp, contacts%detected)
+    call find_springs(walls, blocks, 0.0_wp, contacts)
   end subroutine detect
+
+  !> Find what touches at the present poses, how each contact point responds, and how long a substep
+  !! may be, also for what may touch within a time `ahead`.
+  subroutine find_springs(walls, blocks, ahead, contacts)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
+    type(springs_t), intent(inout) :: contacts
+    logical :: acts(blocks%n)
+    integer :: t, n
+
+    associate (points => contacts%points, response => contacts%response)
+      call find_sphere_points(walls, blocks, ahead, contacts%spheres, points)
+      acts = blocks%present .and. .not. blocks%asleep
+      do t = 1, points%n   ! also sleepers that are touched, or may be soon
+        acts(points%item(t)%a) = .true.
+        if (points%item(t)%b > 0) acts(points%item(t)%b) = .true.
+      end do
+      call list_bodies(acts, contacts%acting)
+      associate (acting => contacts%acting%body(:contacts%acting%n))
+        call update_motion(blocks, acting, contacts%counterparts)
+        call update_inertia(blocks, acting, contacts%counterparts)
+      end associate
+      call respond(points, contacts%counterparts, response)
+      contacts%stiffness_limit = stiffness_limit(points, response)
+      n = points%n
+      call keep_touching(points)
+      if (points%n < n) call respond(points, contacts%counterparts, response)
+      call form_groups(points, response%groups)
+    end associate
+  end subroutine find_springs
 
   !> Contact forces and torques of the first substep if the candidates for sleep begin it at rest.
   subroutine load_if_still(walls, gravity, dt, candidate, contacts, blocks)
@@ -80,10 +122,11 @@ contains
     type(contact_report_t) :: ignored
     integer :: b
 
-    contacts%substep = equal_substep(dt, substep_limit(walls, contacts%detected, blocks, &
-      min(contacts%substep_ratio*dt, contacts%longest_substep), contacts%courant_max))
-    call match_displacements(contacts%detected, contacts%before, contacts%displacements)
-    associate (acting => contacts%detected%acting, counterparts => contacts%detected%counterparts)
+    contacts%substep = equal_substep(dt, substep_limit(walls, dt, contacts, blocks))
+    call match_displacements(contacts%points, contacts%response%groups, contacts%before, &
+      contacts%displacements)
+    associate (acting => contacts%acting, counterparts => contacts%counterparts, &
+      loads => contacts%loads)
       call update_motion(blocks, acting%body(:acting%n), counterparts)
       do b = 1, blocks%n   ! velocities in the middle of the substep
         if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
@@ -95,9 +138,11 @@ contains
             *matmul(counterparts%inverse_inertia(:, :, b), contacts%steady(4:6, b))
         end associate
       end do
+      loads%force = 0.0_wp
+      loads%torque = 0.0_wp
+      call sum_pairs(contacts%substep, contacts%points, contacts%response, counterparts, &
+        contacts%displacements, loads, ignored)
     end associate
-    call sum_forces(contacts%substep, contacts%detected, contacts%displacements, contacts%loads, &
-                    ignored)
   end subroutine load_if_still
 
   !> Store the forces and energies of chosen contact points with their displacements.
@@ -108,19 +153,20 @@ contains
     type(wrench_t) :: wrench
     integer :: g, t
 
-    associate (detected => contacts%detected, displacements => contacts%displacements)
+    associate (response => contacts%response, displacements => contacts%displacements)
       do g = 1, displacements%n
         if (.not. chosen(g)) cycle
         wrench = wrench_t()
-        call push_group(g, contacts%substep, motion_between(detected%counterparts, &
-          displacements%a(g), displacements%b(g)), detected, displacements, wrench, ignored)
+        call push_group(g, contacts%substep, motion_between(contacts%counterparts, &
+          displacements%a(g), displacements%b(g)), contacts%points, response, displacements, &
+          wrench, ignored)
         displacements%force(:, g) = wrench%force
         displacements%torque_a(:, g) = wrench%torque_a
         displacements%torque_b(:, g) = wrench%torque_b
-        displacements%energy(g) = stored_energy(displacements%k(g), detected%law%gamma_t, &
+        displacements%energy(g) = stored_energy(displacements%k(g), response%law%gamma_t, &
           norm(displacements%xi(:, g)))
-        do t = detected%groups%first(g), detected%groups%first(g + 1) - 1
-          displacements%energy(g) = displacements%energy(g) + detected%response%energy(t)
+        do t = response%groups%first(g), response%groups%first(g + 1) - 1
+          displacements%energy(g) = displacements%energy(g) + response%energy(t)
         end do
       end do
     end associate
@@ -151,8 +197,7 @@ contains
     end do
     left = dt
     do while (left > 0.0_wp)
-      longest = substep_limit(walls, contacts%detected, blocks, min(contacts%substep_ratio*dt, &
-        contacts%longest_substep), contacts%courant_max)
+      longest = substep_limit(walls, dt, contacts, blocks)
       if (.not. left < longest*real(max_substeps, wp)) then
         report%info = 1
         return
@@ -191,8 +236,8 @@ contains
     do
       dt_b = equal_substep(left, longest)
       call drift(0.5_wp*dt_b, blocks)
-      call detect_contacts(walls, blocks, 0.5_wp*dt_b, contacts%detected)
-      allowed = stiffness_limit(contacts%detected)
+      call find_springs(walls, blocks, 0.5_wp*dt_b, contacts)
+      allowed = contacts%stiffness_limit
       if (.not. dt_b > bearable*min(allowed, longest)) exit
       do b = 1, blocks%n
         if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
@@ -207,6 +252,72 @@ contains
     end do
   end subroutine drift_to_middle
 
+  !> Longest substep allowed now [s].
+  !!
+  !! The smallest of a share of the fluid step, a twentieth of the contact time, the limit of
+  !! stiffness, and the Courant limit of eq. (6) with the highest relative speed of any two points
+  !! of two bodies near one another or of a body near a wall. Bodies that are not near stay apart.
+  pure function substep_limit(walls, dt, contacts, blocks) result(limit)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: dt            !! fluid step [s]
+    type(springs_t), intent(in) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    real(wp) :: limit
+    real(wp) :: speed, near, fastest(2)
+    integer :: b, p
+
+    limit = min(contacts%substep_ratio*dt, contacts%contact_time/substeps_per_contact, &
+      contacts%stiffness_limit)
+    near = 0.0_wp
+    associate (spheres => contacts%spheres, radius => contacts%spheres%bounding_radius)
+      do p = 1, spheres%near%n
+        associate (a => spheres%near%a(p), c => spheres%near%b(p))
+          if (blocks%still(a) .and. blocks%still(c)) cycle
+          if (distance(blocks%x(:, a), blocks%x(:, c) + spheres%near%shift(:, p)) &
+              > radius(a) + radius(c) + spheres%unlisted_gap) cycle
+          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, a))*radius(a) &
+            + norm(blocks%omega(:, c))*radius(c) + haste(blocks, a, radius(a)) &
+            + haste(blocks, c, radius(c))
+        end associate
+        if (.not. speed <= near) near = speed
+      end do
+      fastest = 0.0_wp
+      do b = 1, blocks%n
+        if (.not. blocks%present(b) .or. blocks%still(b)) cycle
+        speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*radius(b) &
+          + haste(blocks, b, radius(b))
+        if (.not. speed <= fastest(2)) fastest(2) = speed
+        if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
+        if (.not. speed <= near) then
+          if (near_wall(walls, blocks%x(:, b), radius(b) + spheres%unlisted_gap)) near = speed
+        end if
+      end do
+      if (.not. near*limit <= contacts%courant_max*spheres%smallest) then
+        limit = contacts%courant_max*spheres%smallest/near
+      end if
+      speed = sum(fastest)
+      if (.not. speed*limit <= spheres%unlisted_gap) limit = spheres%unlisted_gap/speed
+    end associate
+  end function substep_limit
+
+  !> Whether a wall or the bed is within a radius of a place.
+  pure function near_wall(walls, x, radius) result(yes)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: x(3), radius   !! [m]
+    logical :: yes
+    real(wp) :: place(3)
+    integer :: w
+
+    yes = .true.
+    do w = 1, walls%n
+      if (dot_product(walls%normal(:, w), x) + radius > walls%offset(w)) return
+    end do
+    yes = walls%bed%there
+    if (.not. yes) return
+    place = bed_place(walls%bed, x)
+    yes = bed_is_near(walls%bed, place - radius, place + radius)
+  end function near_wall
+
   !> The rest of a substep: contact and the other half of the drift.
   subroutine push_bodies(walls, gravity, dt_b, contacts, blocks, report)
     type(walls_t), intent(in) :: walls
@@ -219,23 +330,26 @@ contains
     integer :: k
 
     if (report%substeps == 0 .or. contacts%lubrication%active) call list_bodies(blocks%present, &
-      contacts%detected%acting)
-    associate (detected => contacts%detected, displacements => contacts%displacements, &
-               loads => contacts%loads, support => contacts%support, &
-               acting => contacts%detected%acting%body(:contacts%detected%acting%n))
-      associate (point => detected%points%item(:detected%points%n))
+      contacts%acting)
+    associate (groups => contacts%response%groups, displacements => contacts%displacements, &
+      loads => contacts%loads, support => contacts%support, counterparts => contacts%counterparts, &
+      acting => contacts%acting%body(:contacts%acting%n))
+      associate (point => contacts%points%item(:contacts%points%n))
         call store_counterparts(point%a, point%b, contacts%met)
       end associate
-      call match_displacements(detected, contacts%before, displacements)
-      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
+      call match_displacements(contacts%points, groups, contacts%before, displacements)
+      call integrate_displacements(0.5_wp*dt_b, groups, counterparts, displacements)
       do k = 1, size(acting)
         associate (b => acting(k))
           call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(1:3, b), contacts%steady(4:6, b), &
                          b, blocks)
         end associate
       end do
-      call update_motion(blocks, acting, detected%counterparts)
-      call sum_forces(dt_b, detected, displacements, loads, report)
+      call update_motion(blocks, acting, counterparts)
+      loads%force = 0.0_wp
+      loads%torque = 0.0_wp
+      call sum_pairs(dt_b, contacts%points, contacts%response, counterparts, displacements, loads, &
+        report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
         contacts%lubrication, loads%force)
       woke = .false.
@@ -252,8 +366,8 @@ contains
           if (blocks%asleep(b)) call put_to_sleep(b, blocks)
         end associate
       end do
-      call update_motion(blocks, acting, detected%counterparts)
-      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
+      call update_motion(blocks, acting, counterparts)
+      call integrate_displacements(0.5_wp*dt_b, groups, counterparts, displacements)
     end associate
     call drift(0.5_wp*dt_b, blocks)
     if (woke) call restore_contacts(blocks, contacts)
@@ -264,7 +378,8 @@ contains
     class(springs_t), intent(in) :: contacts
     real(wp) :: energy
 
-    energy = elastic_energy(contacts%detected, contacts%displacements, contacts%sleep%frozen)
+    energy = elastic_energy(contacts%points%n, contacts%response, contacts%displacements, &
+      contacts%sleep%frozen)
   end function energy
 
 end module springs_m

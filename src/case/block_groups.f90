@@ -22,14 +22,15 @@ contains
   subroutine visit_contact(v, contact)
     type(group_visitor_t), intent(inout) :: v
     type(contact_input_t), intent(inout) :: contact
-    character(*), parameter :: law = 'law = ''constants'''
+    character(*), parameter :: law = 'law = ''constants''', spheres = 'model = ''spheres''  '
 
     call v%about('how blocks touch one another, the walls and the bed')
     call v%option('model', contact%model, 'surface spheres', 'what touches: points of the ' &
       //'surface against the exact surface, or the contact spheres of the paper', &
       example='''spheres''')
     call v%option('law', contact%law, 'restitution constants', 'where the forces come from: ' &
-      //'restitution and contact_time, or the constants k_n to eta_t', example='''constants''')
+      //'restitution and contact_time, or, with model = ''spheres'', the ' &
+      //'constants k_n to eta_t', example=spheres//law)
     if (v%good('law')) then
       call v%without_meaning(contact%law == 'restitution', &
         'k_n gamma_n eta_n k_t gamma_t eta_t', 'law = ''restitution''', &
@@ -37,18 +38,19 @@ contains
       call v%without_meaning(contact%law == 'constants', 'restitution', 'law = ''constants''', &
         'only law = ''restitution'' has it')
     end if
-    call v%option('solver', contact%solver, 'springs impulses', 'how the forces are found: ' &
-      //'impulses of all contact points together in long steps, or springs in short ones; ' &
-      //'''impulses'' is the default with physics = ''dry'' and ''light'' where it can be', &
-      example='''impulses''')
-    if (.not. v%given('solver') .and. (contact%model == 'spheres' &
-        .or. contact%law == 'constants')) contact%solver = 'springs'
-    if (v%good('solver')) then
-      call v%require('solver', contact%solver == 'springs' .or. (contact%model == 'surface' &
-        .and. contact%law == 'restitution'), 'needs model = ''surface'' and law = ''restitution''')
-      call v%without_meaning(contact%solver == 'impulses', 'substep_ratio courant_max', &
-        'solver = ''impulses''', 'its steps follow contact_time')
-    end if
+    call v%require('law', contact%law == 'restitution' .or. contact%model == 'spheres', &
+      'needs model = ''spheres''')
+    call v%option('solver', contact%solver, 'impulses springs', 'how the forces are found: ' &
+      //'impulses of all contact points together in long steps, with model = ''surface'', or ' &
+      //'springs in short ones, with model = ''spheres''; the default follows the model', &
+      example=spheres//'solver = ''springs''')
+    if (.not. v%given('solver') .and. contact%model == 'spheres') contact%solver = 'springs'
+    call v%require('solver', contact%solver == 'impulses' .or. contact%model == 'spheres', &
+      'needs model = ''spheres''; surfaces take solver = ''impulses'', the default')
+    call v%require('solver', contact%solver == 'springs' .or. contact%model == 'surface', &
+      'needs model = ''surface''')
+    if (contact%solver == 'impulses') call v%pass_over('substep_ratio courant_max', &
+      'solver = ''impulses''')
     call v%real('restitution', contact%restitution, between(0.0_wp, 1.0_wp, '-'), &
       'speed after over speed before a central impact without friction; below 0.01 as 0.01', &
       example='0.5')
@@ -57,27 +59,28 @@ contains
       //'blocks stiffer. With any law a step of the blocks is a twentieth of it at most', &
       example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
-      //'with '//law//', of each pair of spheres', example=law//'  k_n = 2e5')
+      //'with '//law//', of each pair of spheres', example=spheres//law//'  k_n = 2e5')
     call v%real('gamma_n', contact%gamma_n, between(1.0_wp, 10.0_wp, '-'), &
-      'power of the overlap, with '//law, example=law//'  gamma_n = 1.5')
+      'power of the overlap, with '//law, example=spheres//law//'  gamma_n = 1.5')
     call v%real('eta_n', contact%eta_n, not_negative('N s/m'), &
-      'damping normal to the surface, with '//law, example=law//'  eta_n = 5')
+      'damping normal to the surface, with '//law, example=spheres//law//'  eta_n = 5')
     call v%real('k_t', contact%k_t, not_negative('N/m^gamma_t'), &
-      'stiffness along the surface, with '//law, example=law//'  k_t = 2e5')
+      'stiffness along the surface, with '//law, example=spheres//law//'  k_t = 2e5')
     call v%real('gamma_t', contact%gamma_t, positive('-'), &
-      'power of the displacement along the surface, with '//law, example=law//'  gamma_t = 1.5')
+      'power of the displacement along the surface, with '//law, &
+      example=spheres//law//'  gamma_t = 1.5')
     call v%real('eta_t', contact%eta_t, not_negative('N s/m'), &
-      'damping along the surface, with '//law, example=law//'  eta_t = 5')
+      'damping along the surface, with '//law, example=spheres//law//'  eta_t = 5')
     call v%real('friction', contact%friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on block', example='0.5')
     call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on wall and bed', example='0.5')
     call v%real('substep_ratio', contact%substep_ratio, share, &
-      'longest step of the blocks over that of the run; by default 0.05, in ''light'' 1', &
-      example='0.02')
+      'longest step of the blocks over that of the run, with springs; by default 0.05, ' &
+      //'in ''light'' 1', example=spheres//'substep_ratio = 0.02')
     call v%real('courant_max', contact%courant_max, share, 'way of a block in one of its ' &
-      //'steps over the size of its contact spheres, at most (eq. (6) of the paper)', &
-      example='0.05')
+      //'steps over the size of its contact spheres, at most: eq. (6) of the paper, springs', &
+      example=spheres//'courant_max = 0.05')
     call v%logical('sleep', contact%sleep, 'blocks at rest cost nothing until something ' &
       //'disturbs them')
     call v%logical('lubrication', contact%lubrication, 'what the grid misses of the films of ' &

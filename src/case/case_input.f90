@@ -55,11 +55,6 @@ contains
     allocate (case%water(n(g_water)), case%shape(n(g_shape)), case%body(n(g_body)), &
               case%drop(n(g_drop)))
     shapes = shape_names(list)
-    i = first_of(list, 'run')
-    if (i > 0) then   ! of contact without a flow, wherever its group stands
-      if (any(first_value(list(i), 'physics') == ['dry  ', 'light'])) case%contact%solver &
-        = 'impulses'
-    end if
     n = 0
     do i = 1, size(list)
       call v%start(list(i))

@@ -87,7 +87,7 @@ module case_types_m
   type :: contact_input_t
     character(name_length) :: model = 'surface'
     character(name_length) :: law = 'restitution'
-    character(name_length) :: solver = 'springs'
+    character(name_length) :: solver = 'impulses'
     real(wp) :: restitution = 0.3_wp
     real(wp) :: contact_time = 2.0e-3_wp            !! [s]
     real(wp) :: k_n = 1.0e5_wp, gamma_n = 1.0_wp, eta_n = 10.0_wp   !! [N/m^gamma, -, N s/m]

@@ -183,8 +183,8 @@ contains
     end associate
   end subroutine without_meaning
 
-  !> Variables that have no meaning because of the physics that was chosen: those given are passed
-  !! over with a warning, see `find_idle`.
+  !> Variables that have no meaning because of the physics, or the solver, that was chosen: those
+  !! given are passed over with a warning, see `find_idle`.
   subroutine pass_over(self, variables, chosen)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variables   !! one blank between them
@@ -192,6 +192,7 @@ contains
     character(:), allocatable :: names
     integer :: w, i, line, n
 
+    self%left_out = self%left_out//variables//' '
     names = ''
     n = 0
     associate (words => words_of(variables))

@@ -25,7 +25,7 @@ contains
     real(wp) :: heaviest, depth, rest_overlap
     integer :: s
 
-    if (size(case%body) + size(case%drop) == 0) return
+    if (case%contact%solver /= 'springs' .or. size(case%body) + size(case%drop) == 0) return
     if (case%contact%law == 'restitution' .and. case%contact%restitution < min_restitution) then
       call warnings%add('&contact restitution', case%contact%restitution, 'acts as ' &
         //brief(min_restitution)//': blocks leave their supports with that share of the speed ' &

@@ -3,15 +3,13 @@
 !! Each edge is the border of a wedge. They touch along n, the normal of both lines, if n lies in
 !! the fan of outward normals of each wedge (between those of its two facets), and if the deepest
 !! place of one of them in the wedge of the other lies between its ends and beside the other edge:
-!! past its ends its corners touch instead. These conditions fade in and out, and the energy
-!! depth^2 weight is a smooth function of position: `weight_slope` gives the other part of the
-!! force.
+!! past its ends its corners touch instead. These conditions fade in and out.
 module edge_crossing_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
   implicit none
   private
-  public :: edge_t, crossing_t, cross_edges, turn_before, way_apart, weight_slope
+  public :: edge_t, crossing_t, cross_edges, turn_before, way_apart
 
   !> A convex edge, in any axes.
   type :: edge_t
@@ -140,15 +138,6 @@ contains
     part = part**2*(3.0_wp - 2*part)
   end function fade
 
-  !> Change of log(`fade`) with x; zero where `fade` is zero.
-  elemental function fade_slope(x) result(slope)
-    real(wp), intent(in) :: x
-    real(wp) :: slope
-
-    slope = 0.0_wp
-    if (x > 0.0_wp .and. x < 1.0_wp) slope = 6*(1.0_wp - x)/(x*(3.0_wp - 2*x))
-  end function fade_slope
-
   !> One where one of two is one, zero where both are zero; smooth.
   pure function either(parts) result(part)
     real(wp), intent(in) :: parts(2)
@@ -194,135 +183,5 @@ contains
 
     width = max(share*depth, min_share*extent)/sine
   end function fade_width
-
-  !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
-  !! about the place of the crossing [1/rad].
-  !!
-  !! The lines of `cross_edges` backwards: `by_x` is the change of log(weight) with x.
-  pure subroutine weight_slope(guest, host, crossing, with_shift, with_turn)
-    type(edge_t), intent(in) :: guest, host         !! in the same axes
-    type(crossing_t), intent(in) :: crossing        !! of weight > 0 and depth > 0
-    real(wp), intent(out) :: with_shift(3), with_turn(3)
-    real(wp) :: d(3), normal(3), sine2, s, t, cosine, lean_s, lean_t, steep(3), steepness
-    real(wp) :: by_n(3), by_normal(3), by_d(3), by_u(3), by_into(3, 2)
-    real(wp) :: by_s, by_t, by_depth, by_sine, by_lean, by_cosine, by_peak, by_other
-    real(wp) :: by_width(2), by_second(2), ends(2, 2), sine
-
-    associate (u => guest%along, w => host%along, n => crossing%normal, depth => crossing%depth)
-      d = host%start - guest%start
-      normal = cross(u, w)
-      sine2 = dot_product(normal, normal)
-      sine = sqrt(sine2)
-      s = dot_product(cross(d, w), normal)/sine2
-      t = dot_product(cross(d, u), normal)/sine2
-      cosine = dot_product(u, w)
-      lean_s = lean(n, u, host%into)
-      lean_t = lean(-n, w, guest%into)
-      ends(1, 1) = between_ends(s + depth*lean_s, guest%extent, depth, sine)
-      ends(2, 1) = between_ends(t + cosine*depth*lean_s, host%extent, depth, sine)
-      ends(1, 2) = between_ends(t + depth*lean_t, host%extent, depth, sine)
-      ends(2, 2) = between_ends(s + cosine*depth*lean_t, guest%extent, depth, sine)
-
-      by_n = 0.0_wp
-      by_into = 0.0_wp
-      call fan_slope(n, guest%into, by_n, by_into)
-      by_normal = 0.0_wp
-      call fan_slope(-n, host%into, by_normal)
-      by_n = by_n - by_normal
-
-      ! the peak of the guest in the host
-      call end_slope(s + depth*lean_s, guest%extent, depth, sine, by_peak, by_width)
-      call end_slope(t + cosine*depth*lean_s, host%extent, depth, sine, by_other, by_second)
-      by_width = by_width + by_second
-      call share_of_either(product(ends, 1), 1, by_peak, by_other, by_width)
-      by_s = by_peak
-      by_t = by_other
-      by_depth = lean_s*(by_peak + cosine*by_other) + by_width(1)
-      by_sine = by_width(2)
-      by_cosine = by_other*depth*lean_s
-      by_lean = depth*(by_peak + cosine*by_other)
-      by_u = 0.0_wp
-      steep = host%into(:, 1) - host%into(:, 2)
-      steepness = dot_product(u, steep)
-      if (abs(steepness) > 0.0_wp) then
-        by_n = by_n - by_lean/steepness*steep
-        by_u = -by_lean*lean_s/steepness*steep
-      end if
-
-      ! the peak of the host in the guest
-      call end_slope(t + depth*lean_t, host%extent, depth, sine, by_peak, by_width)
-      call end_slope(s + cosine*depth*lean_t, guest%extent, depth, sine, by_other, by_second)
-      by_width = by_width + by_second
-      call share_of_either(product(ends, 1), 2, by_peak, by_other, by_width)
-      by_t = by_t + by_peak
-      by_s = by_s + by_other
-      by_depth = by_depth + lean_t*(by_peak + cosine*by_other) + by_width(1)
-      by_sine = by_sine + by_width(2)
-      by_cosine = by_cosine + by_other*depth*lean_t
-      by_lean = depth*(by_peak + cosine*by_other)
-      steep = guest%into(:, 1) - guest%into(:, 2)
-      steepness = dot_product(w, steep)
-      if (abs(steepness) > 0.0_wp) then
-        by_n = by_n + by_lean/steepness*steep
-        steep = by_lean/steepness*(n - lean_t*w)
-        by_into(:, 1) = by_into(:, 1) + steep
-        by_into(:, 2) = by_into(:, 2) - steep
-      end if
-
-      by_n = by_n - by_depth*d
-      by_d = -by_depth*n + (by_s*cross(w, normal) + by_t*cross(u, normal))/sine2
-      by_normal = (by_s*cross(d, w) + by_t*cross(d, u) - 2*(by_s*s + by_t*t)*normal)/sine2 &
-        + (by_n - dot_product(by_n, n)*n)/sign(sine, dot_product(normal, n)) &
-        + by_sine/sine*normal
-      by_u = by_u + by_cosine*w + by_t*cross(normal, d)/sine2 + cross(w, by_normal)
-
-      with_shift = -by_d
-      with_turn = cross(guest%start - crossing%place, -by_d) + cross(u, by_u) &
-        + cross(guest%into(:, 1), by_into(:, 1)) + cross(guest%into(:, 2), by_into(:, 2))
-    end associate
-  end subroutine weight_slope
-
-  !> Change of log(`in_fan`) with the normal, and with the directions into the facets; added.
-  pure subroutine fan_slope(normal, into, by_normal, by_into)
-    real(wp), intent(in) :: normal(3), into(3, 2)
-    real(wp), intent(inout) :: by_normal(3)
-    real(wp), intent(inout), optional :: by_into(3, 2)
-    real(wp) :: slope
-    integer :: i
-
-    i = merge(1, 2, dot_product(normal, into(:, 1)) > dot_product(normal, into(:, 2)))
-    slope = -fade_slope(1.0_wp - dot_product(normal, into(:, i))/beside)/beside
-    by_normal = by_normal + slope*into(:, i)
-    if (present(by_into)) by_into(:, i) = by_into(:, i) + slope*normal
-  end subroutine fan_slope
-
-  !> Change of log(`between_ends`) with place and depth [1/m] and with the sine; zero where it is
-  !! zero.
-  pure subroutine end_slope(place, extent, depth, sine, by_place, by_width)
-    real(wp), intent(in) :: place, extent, depth, sine   !! as in `between_ends`
-    real(wp), intent(out) :: by_place, by_width(2)
-    real(wp) :: x, width, slope
-
-    width = fade_width(extent, depth, sine)
-    x = min(place, extent - place)/width
-    slope = fade_slope(x)
-    by_place = sign(slope/width, 0.5_wp*extent - place)
-    by_width = 0.0_wp
-    if (share*depth > min_share*extent) by_width(1) = -share*x*slope/(width*sine)
-    by_width(2) = x*slope/sine
-  end subroutine end_slope
-
-  !> From changes of log(parts(which)) to those of log(`either`).
-  pure subroutine share_of_either(parts, which, by_peak, by_other, by_width)
-    real(wp), intent(in) :: parts(2)
-    integer, intent(in) :: which
-    real(wp), intent(inout) :: by_peak, by_other, by_width(2)
-    real(wp) :: ratio
-
-    ratio = parts(which)*(1.0_wp - parts(3 - which))/max(either(parts), tiny(1.0_wp))
-    by_peak = ratio*by_peak
-    by_other = ratio*by_other
-    by_width = ratio*by_width
-  end subroutine share_of_either
 
 end module edge_crossing_m

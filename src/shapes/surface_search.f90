@@ -11,7 +11,8 @@ module surface_search_m
   implicit none
   private
   public :: surface_t, near_list_t, found_t, gather, gather_edges, gather_facets
-  public :: nearest_on_surface, nearest_places, search_surface, min_distance, segment_distance2, nowhere
+  public :: nearest_on_surface, nearest_places, search_surface, min_distance
+  public :: segment_distance2, nowhere
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]

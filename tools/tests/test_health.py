@@ -99,8 +99,6 @@ def test_what_older_programs_do_not_tell(make_run) -> None:
 def test_what_makes_blocks_stiffer_depends_on_the_contact(make_run) -> None:
     run = make_run(replace(APART, more="&contact model = 'spheres' /\n"))
     assert "model = 'surface'" in health._stiffer(run)
-    run = make_run(replace(APART, more="&contact law = 'constants' k_n = 2e4 /\n"))
-    assert "k_n, now 20000" in health._stiffer(run)
 
 
 def test_blocks_that_wait_are_named(make_run) -> None:

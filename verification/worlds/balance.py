@@ -11,7 +11,7 @@ from worlds import draw
 from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
-SPRUNG, PUSHED = 0.03, 1e-3  # overlap in a hit by springs of these contact times, and by impulses
+PUSHED = 1e-3  # overlap in a hit, over the thinnest block
 BUOYANCY = 1e-5  # what the tolerance of the pressure leaves
 EXCHANGED = 1e-2  # 2e-2 beside plates thinner than a cell
 CLOSED = 1e-6  # open share of a cell that counts as none
@@ -68,7 +68,7 @@ def landing() -> World:
             ("boundary", draw.ALONG_X),
             ("fluid", {"liquid_density": 700.0, "liquid_viscosity": 0.56234, "gas_density": 0.84,
                        "water_level": 0.11703}),
-            ("contact", {"solver": "springs", "contact_time": 2.8e-3, "restitution": 0.275}),
+            ("contact", {"model": "spheres", "contact_time": 2.8e-3, "restitution": 0.275}),
             ("shape", {"name": "s", "kind": "sphere", "size": 0.093313, "density": 2492.8,
                        "refinement": 1}),
             ("body", sphere),
@@ -76,14 +76,13 @@ def landing() -> World:
     )  # fmt: skip
 
 
-def lying_cube(quaternion: list[float], solver: str) -> World:
+def lying_cube(quaternion: list[float]) -> World:
     """A cube of 1 m that sinks onto the floor, cells of .2 m, from .3 m above it."""
     return World(
         [
             ("run", {"t_end": 2.0, "dt": 0.01, "field_interval": 0.0, "restart_interval": 0.0}),
             ("grid", {"cells": [15, 15, 12], "length": [3.0, 3.0, 2.4]}),
             ("fluid", {"water_level": 2.1}),
-            ("contact", {"solver": solver}),
             ("shape", {"name": "c", "kind": "cube", "size": 1.0, "density": 2300.0}),
             ("body", {"shape": "c", "position": [1.53, 1.47, 0.8], "quaternion": quaternion}),
         ]
@@ -119,8 +118,8 @@ def balance(world: World, folder: Path) -> None:
     if not b.n:
         return
     thinnest = min(np.ptp(run.shapes[name].points, axis=0).min() for name in b.shape)
-    most = SPRUNG if world.value("contact", "solver") == "springs" else PUSHED
-    below("overlap over the thinnest block", s.max_overlap / thinnest, most)
+    if world.value("contact", "model") == "surface":  # contact spheres are not the shape
+        below("overlap over the thinnest block", s.max_overlap / thinnest, PUSHED)
     free = ~b.fixed & (b.entry_time <= b.release_time)
     there = (b.release_time < b.time[:-1, None]) & free  # a release gives velocity in its step
     dt = np.diff(b.time)[:, None, None]

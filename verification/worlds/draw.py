@@ -194,8 +194,8 @@ def lying(draw: Draw) -> World:
         ("boundary", ends),
         ("fluid", {**liquid, "water_level": level}),
         ("numerics", draw(numerics())),
-        # springs have to sink; how far impulses let them sink goes with the square of this time
-        ("contact", {**draw(contact(across)), "solver": "impulses",
+        # contact spheres have to sink; how far surfaces do goes with the square of this time
+        ("contact", {**draw(contact(across)), "model": "surface",
                      "contact_time": 3e-3 * sqrt(across / GRAVITY)}),
     ]  # fmt: skip
     for b in range(n):
@@ -259,7 +259,7 @@ def body(
 def contact(draw: Draw, across: float) -> Group:
     """How blocks collide."""
     return {
-        "solver": draw(one_of("springs", "impulses")),
+        "model": draw(one_of("spheres", "surface")),
         "contact_time": 0.03 * sqrt(across / GRAVITY) * draw(number(0.5, 2.0)),
         "restitution": draw(number(0.1, 0.9)),
         "friction": draw(number(0.2, 1.0)),

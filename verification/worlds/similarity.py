@@ -39,7 +39,7 @@ def pair(name: str) -> World:
             ("fluid", SAME_FLUIDS | ({} if name == "held" else {"water_level": 0.15})),
             *([("water", dam)] if name == "held" else []),
             ("numerics", {"divergence_tolerance": 1e-6, **PAIRS[name]}),
-            ("contact", {"contact_time": 2e-3, "solver": "springs"}),
+            ("contact", {"contact_time": 2e-3}),
             ("shape", {"name": "b", "kind": "hexapod", "size": 0.02, "density": 2300.0}),
             *(("body", {"shape": "b", "fixed": place is held, "position": place[0],
                         "axis": place[1], "angle_deg": place[2]})

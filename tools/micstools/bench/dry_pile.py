@@ -32,7 +32,7 @@ def start(n: int, box: float, seed: int) -> tuple[Array, Array]:
 
 def case(
     n: int, output: Path, seconds: float = 2.0, dt: float = 0.1, contact_time: float = 0.008,
-    sleep: bool = False, box: float = BOX, seed: int = 1, solver: str = "impulses",
+    sleep: bool = False, box: float = BOX, seed: int = 1,
 ) -> str:  # fmt: skip
     """The case file of n blocks."""
     position, quaternion = start(n, box, seed)
@@ -41,7 +41,7 @@ def case(
         f"&run physics = 'dry'  t_end = {seconds!r}  dt = {dt!r}  output = '{output}'",
         "  field_interval = 0  restart_interval = 0 /",
         f"&grid cells = 60, 60, 60  length = {box!r}, {box!r}, {float(top)!r} /",
-        f"&contact solver = '{solver}'  contact_time = {contact_time!r}  friction = 0.5",
+        f"&contact contact_time = {contact_time!r}  friction = 0.5",
         f"  restitution = 0.3  wall_friction = 0.5  sleep = {'T' if sleep else 'F'} /",
         f"&shape name = 'hexapod'  kind = 'hexapod'  size = {EDGE}  density = {DENSITY}",
         "  refinement = 1 /",

@@ -158,8 +158,6 @@ def _stiffer(run: Run) -> str:
     """What makes blocks sink less into each other."""
     if run.value("contact", "model") == "spheres":
         return "&contact model = 'surface': contact spheres leave edges and corners free"
-    if run.value("contact", "law") == "constants":
-        return f"a larger &contact k_n, now {figure(float(run.value('contact', 'k_n')))}"
     duration = float(run.value("contact", "contact_time"))
     return f"a shorter &contact contact_time, now {figure(duration)} s"
 

@@ -80,8 +80,8 @@ def drop(run: Run, checks: Checks) -> None:
     """Blocks sink to the bed, lie on it and not in it, and no liquid is lost."""
     b, name = run.bodies, run.folder.name
     checks.true(f"{name}: all on the bed", (b.on_floor[-1] == 1).all())
-    checks.below(f"{name}: speed at the end [m/s]", np.abs(b.velocity[-1]).max(), 0.05)
-    checks.below(f"{name}: overlap at the end [m]", run.series.max_overlap[-1], 2e-5)
+    checks.below(f"{name}: speed at the end [m/s]", np.abs(b.velocity[-1]).max(), SPEED)
+    checks.below(f"{name}: overlap at the end [m]", run.series.max_overlap[-1], 1e-6)
 
 
 def check(runs: list[Run], checks: Checks) -> None:

@@ -15,7 +15,7 @@ PAIRS = ("two spheres", "face on face", "edge on face", "corner on face", "edge 
 OBLIQUE = ("edge on face with ends on its border", "edge along edge", "corner on corner")
 """These touch along several oblique normals; the last pair slips off sideways and turns."""
 LENGTH, TIME = 1e-4, 1e-2  # units of the tables D3 [m], [s]
-OPTIONS = ("solver", "restitution", "contact_time", "friction", "wall_friction", "law")
+OPTIONS = ("model", "restitution", "contact_time", "friction", "wall_friction", "law")
 CONSTANTS = ("k_n", "gamma_n", "eta_n", "k_t", "gamma_t", "eta_t")
 VARIES = tuple(f"contact {name}" for name in OPTIONS + CONSTANTS)
 

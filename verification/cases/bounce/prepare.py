@@ -42,6 +42,9 @@ OBLIQUE = (
 )
 
 
+STEP = 1e-3  # [s]
+
+
 def body(shape: str, place: tuple[float, ...], speed: float, attitude: str = "") -> str:
     """A block that moves up or down."""
     where = ", ".join(f"{x:.12g}" for x in place)
@@ -49,13 +52,12 @@ def body(shape: str, place: tuple[float, ...], speed: float, attitude: str = "")
     return f"&body shape = '{shape}'  position = {where}  {moves}  {attitude} /\n"
 
 
-def restitution(e: float, dt: float = 1e-3, solver: str = "springs") -> None:
+def restitution(e: float, dt: float) -> None:
     """Sphere and cubes at the floor, and blocks against one another; no friction."""
     text = HEAD.format(what=f"restitution {e:g}", end=0.12, dt=dt) + TANK.format(height=0.2)
     text += NO_WEIGHT + SHAPES
-    text += f"&contact restitution = {e:g}  friction = 0  wall_friction = 0"
-    text += f"  solver = '{solver}' /\n"
-    name = f"e{100 * e:03.0f}" + (f"_impulses_{1e3 * dt:g}ms" if solver == "impulses" else "")
+    text += f"&contact restitution = {e:g}  friction = 0  wall_friction = 0 /\n"
+    name = f"e{100 * e:03.0f}" + (f"_{1e3 * dt:g}ms" if dt > STEP else "")
     on_floor = "".join(
         body(shape, (0.05 + 0.1 * k, 0.05, 0.032), -DOWN, attitude)
         for k, (shape, attitude) in enumerate(ON_FLOOR)
@@ -77,7 +79,7 @@ def ball(h: float, e: float, end: float, contact_time: float) -> None:
     """A ball dropped from a height; time to see the second impact."""
     what = f"ball from {h:g} m, restitution {e:g}"
     text = HEAD.format(what=what, end=end, dt=1e-3) + TANK.format(height=1.2) + SHAPES
-    text += f"&contact restitution = {e:g}  contact_time = {contact_time:g}  solver = 'springs' /\n"
+    text += f"&contact model = 'spheres'  restitution = {e:g}  contact_time = {contact_time:g} /\n"
     text += body("sphere", (0.1, 0.1, 0.02 + h), 0.0)
     Path(f"ball_h{100 * h:.0f}_e{100 * e:.0f}_{1e6 * contact_time:.0f}us.nml").write_text(text)
 
@@ -93,7 +95,7 @@ def power_law(name: str, gamma: float, damping: float, speeds: list[float]) -> N
     text = HEAD.format(what=f"spring of power {gamma:g}", end=0.07, dt=1e-4)
     text += TANK.format(height=0.2) + NO_WEIGHT
     text += f"&shape name = 'sphere'  kind = 'sphere'  size = 0.04  density = {density:.16g} /\n"
-    text += f"&contact law = 'constants'  k_n = {k:.16g}  gamma_n = {gamma:g}"
+    text += f"&contact model = 'spheres'  law = 'constants'  k_n = {k:.16g}  gamma_n = {gamma:g}"
     text += f"  eta_n = {damping * MASS / TIME:.16g}  friction = 0  wall_friction = 0 /\n"
     for n, v in enumerate(speeds):
         speed = v * LENGTH / TIME
@@ -102,10 +104,10 @@ def power_law(name: str, gamma: float, damping: float, speeds: list[float]) -> N
 
 
 for e in (0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
-    restitution(e)
+    restitution(e, STEP)
 for e in (0.25, 0.75):
-    for dt in (1e-3, 4e-3, 2e-2):
-        restitution(e, dt, "impulses")
+    for dt in (STEP, 4e-3, 2e-2):
+        restitution(e, dt)
 for h, e, _, _, second, _ in np.loadtxt(HERE / "D7.csv", delimiter=",", skiprows=2):
     for contact_time in (2e-3, 5e-4):
         ball(h, e, 1.1 * second, contact_time)

@@ -8,8 +8,8 @@ from micstools.reading.reader import Run
 
 BAND = 0.01
 CREEP = 1e-6  # [m/s]
-QUICK = ("deg*_mu???", "*_awake", "*_4ms")
-VARIES = ("contact friction", "contact wall_friction", "contact sleep", "contact solver")
+QUICK = ("deg*_mu???", "*_4ms")
+VARIES = ("contact friction", "contact wall_friction", "contact sleep")
 ROWS = table(__file__, "D5.csv").to_numpy()
 
 

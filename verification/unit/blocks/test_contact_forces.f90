@@ -4,13 +4,14 @@ module test_contact_forces_m
   use case_types_m, only: contact_input_t
   use vectors_m, only: cross
   use bed_m, only: bed_counterpart
-  use contact_points_m, only: contact_point_t, add_point, form_groups
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point, form_groups
   use displacements_m, only: displacements_t, reserve_displacements
   use contact_laws_m, only: choose_law
-  use contact_response_m, only: respond
-  use contact_detection_m, only: contact_detection_t
-  use contact_forces_m, only: loads_t, contact_report_t, match_displacements, &
-    integrate_displacements, sum_forces, elastic_energy
+  use counterparts_m, only: counterparts_t
+  use contact_response_m, only: response_t, respond
+  use contact_solver_m, only: loads_t, contact_report_t
+  use contact_forces_m, only: match_displacements, integrate_displacements, sum_pairs, &
+    elastic_energy
   use two_cubes_m, only: vector, free_bodies
   implicit none
   private
@@ -21,7 +22,9 @@ module test_contact_forces_m
   real(wp), parameter :: k_n = 1.0e4_wp, k_t = 5.0e3_wp       !! [N/m^gamma]
   real(wp), parameter :: mu = 0.5_wp, wall_mu = 0.3_wp        !! friction [-]
   integer, parameter :: floor = -5
-  type(contact_detection_t) :: detected
+  type(contact_points_t) :: points
+  type(response_t) :: response
+  type(counterparts_t) :: counterparts
   type(loads_t) :: loads
   type(displacements_t) :: rest
   type(contact_report_t) :: report
@@ -42,11 +45,9 @@ contains
   !> Three bodies at rest, stiffnesses with the constants above and a normal dashpot.
   subroutine begin(gamma, eta)
     real(wp), intent(in) :: gamma, eta       !! [-], [N s/m]
-    type(contact_detection_t) :: fresh
     type(contact_input_t) :: input
     integer :: b
 
-    detected = fresh
     input%law = 'constants'
     input%k_n = k_n
     input%k_t = k_t
@@ -56,10 +57,10 @@ contains
     input%eta_t = 0.0_wp
     input%friction = mu
     input%wall_friction = wall_mu
-    call choose_law(input, detected%law)
-    call free_bodies(mass, detected%counterparts)
+    call choose_law(input, response%law)
+    call free_bodies(mass, counterparts)
     do b = 1, 3
-      detected%counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
+      counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
     end do
   end subroutine begin
 
@@ -72,16 +73,24 @@ contains
 
     call reserve_displacements(1, displacements)
     call reserve_displacements(1, before)
-    detected%acting%n = 3
-    detected%acting%body = [1, 2, 3]
-    detected%points%n = 0
+    points%n = 0
     do t = 1, size(point)
-      call add_point(point(t), detected%points)
+      call add_point(point(t), points)
     end do
-    call form_groups(detected%points, detected%groups)
-    call respond(detected%points, detected%law, detected%counterparts, detected%response)
-    call match_displacements(detected, before, displacements)
+    call form_groups(points, response%groups)
+    call respond(points, counterparts, response)
+    call match_displacements(points, response%groups, before, displacements)
   end subroutine detect_again
+
+  !> Forces of a substep.
+  subroutine sum_forces(dt, displacements)
+    real(wp), intent(in) :: dt   !! [s]
+    type(displacements_t), intent(inout) :: displacements
+
+    loads%force = 0.0_wp
+    loads%torque = 0.0_wp
+    call sum_pairs(dt, points, response, counterparts, displacements, loads, report)
+  end subroutine sum_forces
 
   !> Forces of many contact points in all directions add up to nothing, and so do their moments
   !! about the origin, those on the floor included.
@@ -96,18 +105,18 @@ contains
     place = 0.0_wp
     do i = 1, 3
       place(:, i) = vector(i, 1)
-      detected%counterparts%v(:, i) = vector(i, 2)
-      detected%counterparts%omega(:, i) = vector(i, 3)
+      counterparts%v(:, i) = vector(i, 2)
+      counterparts%omega(:, i) = vector(i, 3)
     end do
     do t = 1, 8
       p = vector(t, 4)
       point(t) = contact_point_t(a(t), b(t), t/2, p - place(:, a(t)), p - place(:, b(t)), &
-        vector(t, 5), 0.01_wp*t, 0.1_wp*t, 1.0_wp, 10*vector(t, 6), 10*vector(t, 7))
+        vector(t, 5), 0.01_wp*t, length=1.0_wp)
       point(t)%normal = point(t)%normal/norm2(point(t)%normal)
     end do
     call detect_again(point, displacements)
-    call integrate_displacements(0.01_wp, detected, displacements)
-    call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
+    call integrate_displacements(0.01_wp, response%groups, counterparts, displacements)
+    call sum_forces(1.0e-3_wp, displacements)
     call check('forces add up to nothing', sum(loads%force, 2), 0*x, 1.0e-11_wp)
     moment = sum(loads%torque, 2)
     do i = 1, 3
@@ -131,15 +140,15 @@ contains
       call detect_again([contact_point_t(2, 1, 1, normal=z, depth=d + i*step, length=1.0_wp)], &
         displacements)
       displacements%xi(:, 1) = 0.0_wp
-      call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
-      energy(i) = elastic_energy(detected, displacements, rest)
+      call sum_forces(1.0e-3_wp, displacements)
+      energy(i) = elastic_energy(points%n, response, displacements, rest)
       if (i == 0) call check('force k d^1.5', loads%force(3, 1), k_n*d**1.5_wp, 1.0e-12_wp*k_n)
     end do
     call check('slope', (energy(1) - energy(-1))/(2*step), k_n*d**1.5_wp, 1.0e-6_wp*k_n*d**1.5_wp)
     do i = -1, 1
       displacements%xi(:, 1) = (stretch + i*step)*x
-      call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
-      energy(i) = elastic_energy(detected, displacements, rest)
+      call sum_forces(1.0e-3_wp, displacements)
+      energy(i) = elastic_energy(points%n, response, displacements, rest)
       if (i == 0) call check('a counterpart that went by pulls along', loads%force(:, 2), &
         k_t*stretch**1.5_wp*x - k_n*(d + step)**1.5_wp*z, 1.0e-12_wp*k_n)
     end do
@@ -148,8 +157,8 @@ contains
     call reserve_displacements(2, rest)
     rest%n = 2
     rest%energy(:2) = [1.0_wp, 2.0_wp]
-    call check('contact points at rest keep theirs', elastic_energy(detected, displacements, &
-      rest), energy(1) + 3.0_wp, 1.0e-14_wp)
+    call check('contact points at rest keep theirs', elastic_energy(points%n, response, &
+      displacements, rest), energy(1) + 3.0_wp, 1.0e-14_wp)
   end subroutine check_energy
 
   !> Friction holds up to its share of the normal force; what slips pulls with just that.
@@ -162,11 +171,11 @@ contains
       contact_point_t(3, 1, 1, normal=-z, depth=d, length=1.0_wp)], displacements)
     displacements%xi(:, 1) = 0.99_wp*wall_mu*push/k_t*x
     displacements%xi(:, 2) = 0.99_wp*mu*push/k_t*x
-    call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
+    call sum_forces(1.0e-3_wp, displacements)
     call check('sticks', loads%force([1, 3], 3), push*[0.99_wp*mu, 1.0_wp], 1.0e-12_wp*push)
     call check('sticks to the floor', loads%force(1, 2), 0.99_wp*wall_mu*push, 1.0e-12_wp*push)
     displacements%xi(:, 1:2) = 2*displacements%xi(:, 1:2)
-    call sum_forces(1.0e-3_wp, detected, displacements, loads, report)
+    call sum_forces(1.0e-3_wp, displacements)
     call check('slips', loads%force([1, 3], 3), push*[mu, 1.0_wp], 1.0e-12_wp*push)
     call check('slips on the floor', loads%force(1, 2), wall_mu*push, 1.0e-12_wp*push)
     call check('stretch', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], 1.0e-12_wp*push/k_t)
@@ -184,15 +193,15 @@ contains
     point = contact_point_t(2, floor, 1, normal=-z, depth=d, length=0.5_wp)
     call detect_again([point], displacements)
     call detect_again([point], displacements)   ! it is not new any more
-    detected%counterparts%v(3, 2) = -closing
+    counterparts%v(3, 2) = -closing
     report = contact_report_t()
-    call sum_forces(dt, detected, displacements, loads, report)
+    call sum_forces(dt, displacements)
     force = loads%force(3, 2)
     call check('damping', force, k_n*d + eta*(closing - 0.5_wp*dt*force/mass(2)), 1.0e-12_wp*force)
     call check('Courant number', report%courant_max, closing*dt/0.5_wp, 1.0e-15_wp)
     call check('overlap', report%overlap_max, d)
-    detected%counterparts%v(3, 2) = 2*k_n*d/eta
-    call sum_forces(dt, detected, displacements, loads, report)
+    counterparts%v(3, 2) = 2*k_n*d/eta
+    call sum_forces(dt, displacements)
     call check('never pulls', loads%force(3, 2), 0.0_wp)
   end subroutine check_damping
 
@@ -209,8 +218,8 @@ contains
       call begin(1.0_wp, eta(i))
       call detect_again([point], displacements)
       call detect_again([point], displacements)   ! it is not new any more
-      detected%counterparts%v(3, 2) = -closing
-      call sum_forces(dt, detected, displacements, loads, report)
+      counterparts%v(3, 2) = -closing
+      call sum_forces(dt, displacements)
       call check('it stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), 1.0e-12_wp)
     end do
   end subroutine check_strong_damping
@@ -230,8 +239,8 @@ contains
       displacements%n = 0
       call detect_again([contact_point_t(2, floor, 1, normal=-z, depth=depth(i), length=1.0_wp)], &
         displacements)
-      detected%counterparts%v(3, 2) = -closing
-      call sum_forces(dt, detected, displacements, loads, report)
+      counterparts%v(3, 2) = -closing
+      call sum_forces(dt, displacements)
       force = loads%force(3, 2)
       call check('damping of a new contact point', force, &
         k_n*depth(i) + part(i)*eta*(closing - 0.5_wp*dt*force/mass(2)), 1.0e-12_wp*force)
@@ -249,16 +258,16 @@ contains
     point = [contact_point_t(2, 1, 4, normal=z, depth=1.0_wp), contact_point_t(2, 1, 6, normal=z, &
       depth=1.0_wp), contact_point_t(3, 1, 4, normal=z, depth=1.0_wp, arm_a=2*z)]
     call detect_again(point, displacements)
-    call check('all are new', all(detected%groups%new(:3)))
-    detected%counterparts%v(:, 1) = 3*x + 7*z
-    detected%counterparts%omega(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
-    call integrate_displacements(dt, detected, displacements)
+    call check('all are new', all(response%groups%new(:3)))
+    counterparts%v(:, 1) = 3*x + 7*z
+    counterparts%omega(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
+    call integrate_displacements(dt, response%groups, counterparts, displacements)
     call check('tangential way', displacements%xi(:, 1), 3*dt*x, 1.0e-15_wp)
     call check('turning takes part', displacements%xi(:, 3), dt*(3 - 2)*x, 1.0e-15_wp)
     point(1)%id = 5
     point(3)%normal = [0.6_wp, 0.0_wp, 0.8_wp]
     call detect_again(point, displacements)
-    call check('one is new', all(detected%groups%new(:3) .eqv. [.true., .false., .false.]))
+    call check('one is new', all(response%groups%new(:3) .eqv. [.true., .false., .false.]))
     call check('and begins at nothing', displacements%xi(:, 1), 0*x)
     call check('one stays', displacements%xi(:, 2), 3*dt*x, 1.0e-15_wp)
     call check('one turns', displacements%xi(:, 3), dt*[0.8_wp, 0.0_wp, -0.6_wp], 1.0e-15_wp)

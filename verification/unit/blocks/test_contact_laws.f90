@@ -32,7 +32,7 @@ contains
     call choose_law(input, law)
     do i = 1, 4
       depth = depth_at_rest(law, k, hard, force(i))
-      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      call law%normal_stiffness(k, depth, hard, elastic)
       call check('the spring holds the force', elastic%force, force(i), 1.0e-9_wp*force(i))
     end do
     call check('linear where shallow', depth_at_rest(law, k, hard, 1.0_wp), 1.0e-4_wp, 1.0e-7_wp)

@@ -1,8 +1,7 @@
-!> Lists of contact points and displacements: order, parting, joining, groups that share one.
+!> Lists of displacements: order, parting, joining, groups of contact points that share one.
 module test_displacements_m
   use check_m, only: check, wp
-  use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, set_apart, &
-    form_groups
+  use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, form_groups
   use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &
     move_displacements
   use contact_solver_m, only: met_t, store_counterparts
@@ -15,7 +14,6 @@ contains
   subroutine test_displacements()
     call check_order()
     call check_moving()
-    call check_points()
     call check_groups()
     call check_met()
   end subroutine test_displacements
@@ -39,6 +37,7 @@ contains
       displacements%a(i) = bodies(i)
       displacements%b(i) = 1
       displacements%id(i) = 2*bodies(i)
+      displacements%other(i) = 9*bodies(i)
       displacements%xi(:, i) = 3.0_wp*bodies(i)
       displacements%k(i) = 4.0_wp*bodies(i)
       displacements%force(:, i) = 5.0_wp*bodies(i)
@@ -65,8 +64,9 @@ contains
     real(wp), allocatable :: x(:)
 
     associate (n => list%n)
-      x = [real([list%a(:n), list%b(:n), list%id(:n)], wp), list%k(:n), list%energy(:n), &
-        list%xi(:, :n), list%force(:, :n), list%torque_a(:, :n), list%torque_b(:, :n)]
+      x = [real([list%a(:n), list%b(:n), list%id(:n), list%other(:n)], wp), list%k(:n), &
+        list%energy(:n), list%xi(:, :n), list%force(:, :n), list%torque_a(:, :n), &
+        list%torque_b(:, :n)]
     end associate
   end function content
 
@@ -88,31 +88,15 @@ contains
     call check('one pair has two displacements', .not. begins_pair(from, 2))
   end subroutine check_moving
 
-  !> Contact points that do not touch yet get a list of their own.
-  subroutine check_points()
-    type(contact_points_t) :: points, soon
-    integer :: i
-
-    do i = 1, 40
-      call add_point(contact_point_t(a=i, b=-i, depth=merge(1.0_wp, -1.0_wp, modulo(i, 3) == 0)), &
-        points)
-    end do
-    call set_apart(points, soon)
-    call check('those that touch', all(points%item(:points%n)%a == [(3*i, i=1, 13)]))
-    call check('the others', soon%n, 27)
-    call check('in order', all(soon%item(2:soon%n)%a > soon%item(:soon%n - 1)%a))
-    call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
-  end subroutine check_points
-
   !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.
   subroutine check_groups()
     type(contact_points_t) :: points
     type(groups_t) :: groups
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
 
-    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp, 1.0_wp), points)
-    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 2.0_wp, 1.5_wp), points)
-    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 8.0_wp, 0.5_wp), points)
+    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp), points)
+    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 3.0_wp), points)
+    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 4.0_wp), points)
     call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), points)
     call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), points)
     call form_groups(points, groups)

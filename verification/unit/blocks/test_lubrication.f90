@@ -21,26 +21,26 @@ contains
     call check_resistance()
     call check_fall('no_slip', 1)
     call check_fall('slip', 2)
-    call check_bounce('springs')
-    call check_bounce('impulses')
+    call check_bounce('spheres')
+    call check_bounce('surface')
     call check_pair()
     call check_swarm()
     call check_cavitation()
   end subroutine test_lubrication
 
   !> Spheres in a tank of 1 m without gravity, and films.
-  subroutine start(kind, x, v, world, solver)
+  subroutine start(kind, x, v, world, model)
     character(*), intent(in) :: kind          !! of the floor
     real(wp), intent(in) :: x(:, :), v(:, :)  !! (3, n)
     type(world_t), intent(out) :: world
-    character(*), intent(in), optional :: solver
+    character(*), intent(in), optional :: model
     character(:), allocatable :: text
     integer :: b
 
     text = '&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &boundary z_min="'//kind &
       //'"/ &fluid gravity=3*0/ &shape name="ball" kind="sphere" size=.006 density=7800/ ' &
       //'&contact restitution=.9 contact_time=1e-4 '
-    if (present(solver)) text = text//'solver="'//solver//'"'
+    if (present(model)) text = text//'model="'//model//'"'
     text = text//'/ '
     do b = 1, size(x, 2)
       text = text//body('ball', x(:, b), v(:, b))
@@ -101,15 +101,15 @@ contains
   end subroutine check_fall
 
   !> A sphere that bounces loses what the film takes on both ways, below one step's way, too.
-  subroutine check_bounce(solver)
-    character(*), intent(in) :: solver
+  subroutine check_bounce(model)
+    character(*), intent(in) :: model
     real(wp), parameter :: v = 0.3_wp, dh = 1.0e-8_wp
     type(world_t) :: world
     real(wp) :: expected, h
     integer :: i
 
     call start('no_slip', reshape([0.5_wp, 0.5_wp, d/2 + 4.1_wp*cell], [3, 1]), &
-               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), world, solver)
+               reshape([0.0_wp, 0.0_wp, -v], [3, 1]), world, model)
     do i = 1, 100000
       call move(world, 1, 2.0e-6_wp)
       if (world%blocks%v(3, 1) > 0.0_wp .and. world%blocks%x(3, 1) - d/2 > 4*cell) exit
@@ -120,7 +120,7 @@ contains
       expected = expected - film_pull(mu, d/2, a, h, expected)/(world%blocks%mass(1)*expected)*dh
       h = h + dh
     end do
-    call check(solver//': speed after the bounce', world%blocks%v(3, 1), expected, 0.003_wp*v)
+    call check(model//': speed after the bounce', world%blocks%v(3, 1), expected, 0.003_wp*v)
   end subroutine check_bounce
 
   !> Two spheres that part hold one another back, with opposite forces, along the line of centres.

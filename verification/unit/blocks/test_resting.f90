@@ -4,7 +4,6 @@ module test_resting_m
   use errors_m, only: to_text
   use sleep_m, only: update_stillness
   use counterparts_m, only: update_counterparts
-  use contact_detection_m, only: detect_contacts
   use resting_m, only: wake_or_sleep
   use world_m, only: world_t, set_up, body
   implicit none
@@ -40,15 +39,15 @@ contains
     if (support == 1) held = body('ball', [0.5_wp, 0.5_wp, r], [speed, 0.0_wp, 0.0_wp], &
       more='fixed=T')
     call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &fluid gravity=0,0,-10/ ' &
-      //'&boundary z_min="no_slip"'//floor//'/ &contact law="constants" k_n=1e6 eta_n=0 eta_t=0/ ' &
-      //'&shape name="ball" kind="sphere" size=.1/ '//held//body('ball', [0.5_wp, 0.5_wp, r]), &
-      world)
+      //'&boundary z_min="no_slip"'//floor//'/ &contact model="spheres" ' &
+      //'law="constants" k_n=1e6 eta_n=0 eta_t=0/ &shape name="ball" kind="sphere" size=.1/ ' &
+      //held//body('ball', [0.5_wp, 0.5_wp, r]), world)
     load = 10.0_wp*world%shapes(1)%density*world%shapes(1)%volume
     world%blocks%x(3, 1 + support) = r + 2*r*support - part*load/k_n
     call update_counterparts(world%walls, gravity, world%blocks, &
-      world%contacts%detected%counterparts)
+      world%contacts%counterparts)
     call update_stillness(world%blocks, changed)
-    call detect_contacts(world%walls, world%blocks, 0.0_wp, world%contacts%detected)
+    call world%contacts%detect(world%walls, world%blocks)
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin
 
@@ -126,7 +125,7 @@ contains
         1.0e-9_wp*load)
       call check('its energy', contacts%sleep%frozen%energy(1), energy, 1.0e-9_wp*energy)
       call check('bears it', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], 1.0e-9_wp*load)
-      call check('no more contact points', contacts%detected%points%n, 0)
+      call check('no more contact points', contacts%points%n, 0)
       call check('but a counterpart', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
         == [1, 1, -5]))
       call check('stands', norm2(blocks%v(:, 1)), 0.0_wp)
@@ -136,7 +135,7 @@ contains
       call start_step(world)
       call check('at work', all([contacts%displacements%n, contacts%sleep%frozen%n] == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp)
-      call check('touches again', contacts%detected%points%n, 1)
+      call check('touches again', contacts%points%n, 1)
     end associate
   end subroutine check_displacements
 

@@ -16,8 +16,7 @@ module test_sleep_m
   real(wp), parameter :: g = 9.81_wp, gravity(3) = [0.0_wp, 0.0_wp, -g]   !! [m/s2]
   real(wp), parameter :: mu = 0.4_wp         !! friction of all [-]
   real(wp), parameter :: dt = 1.0e-2_wp      !! [s]
-  character(*), parameter :: models(3) = [character(7) :: 'spheres', 'surface', 'surface']
-  character(*), parameter :: solvers(3) = [character(8) :: 'springs', 'springs', 'impulses']
+  character(*), parameter :: models(2) = [character(7) :: 'spheres', 'surface']
   integer :: model
 
 contains
@@ -127,11 +126,11 @@ contains
     character(*), intent(in), optional :: contact   !! variables of &contact
     character(:), allocatable :: friction
 
-    friction = '" solver="'//trim(solvers(model))//'" friction=.4 wall_friction=.4 '
+    friction = '" friction=.4 wall_friction=.4 '
     if (present(contact)) friction = friction//contact
     call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="cube" ' &
       //'kind="cube" size=.02 refinement=1/ &shape name="slab" kind="box" size=.12,.12,.02 ' &
-      //'refinement=1/ &contact model="'//trim(models(model))//friction//'/ '//groups, world)
+      //'refinement=1/ &contact model="'//models(model)//friction//'/ '//groups, world)
     if (.not. present(awake)) return
     world%case%contact%sleep = .false.
     call begin(world%case, world, awake)
@@ -178,7 +177,7 @@ contains
     call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp)
     call check('no substeps', one%contact%substeps, 0)
     call check('same poses', one%blocks%x - two%blocks%x, 0.0_wp, &
-      merge(1.0e-7_wp, 1.0e-8_wp, solvers(model) == 'impulses'))   ! overlaps creep back
+      merge(1.0e-7_wp, 1.0e-8_wp, models(model) == 'surface'))   ! overlaps creep back
     call check('same energy', one%contact%energy, two%contact%energy, &
       2*rest_tolerance*two%contact%energy)
     call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
@@ -238,7 +237,7 @@ contains
     call start(tower(1, 1)//body('cube', [0.5_wp + 0.3_wp*d, 0.5_wp, 1.5_wp*d]) &
       //body('cube', [0.5_wp - 4*d, 0.5_wp, 0.55_wp*d], [1.0_wp, 0.0_wp, 0.0_wp], &
       more='fixed=T release_time=1'), one, two, &
-      merge('courant_max=.01 ', repeat(' ', 16), solvers(model) == 'springs'))   ! free of substeps
+      merge('courant_max=.01 ', repeat(' ', 16), models(model) == 'spheres'))   ! free of substeps
     call run(1.0_wp, one, two)
     call check('both sleep', count(one%blocks%asleep), 2)
     call release_body(1.0_wp, 3, one%blocks)
@@ -250,7 +249,7 @@ contains
     call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
     call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
     call check('both as awake', one%blocks%x(:, :2) - two%blocks%x(:, :2), 0.0_wp, &
-      merge(0.1_wp, 0.01_wp, solvers(model) == 'impulses')*d)   ! its steps are others
+      merge(0.1_wp, 0.01_wp, models(model) == 'surface')*d)   ! its steps are others
   end subroutine check_support
 
   !> On a slope a little steeper than friction bears a cube never sleeps, on one less steep it does.
@@ -299,7 +298,7 @@ contains
       call check_balance(world)
       if (world%blocks%v(1, 1) > 1.0e-3_wp) exit
     end do
-    late = merge(wake_tolerance*sqrt(1.0_wp + mu**2)/mu, 0.01_wp, solvers(model) == 'impulses')
+    late = merge(wake_tolerance*sqrt(1.0_wp + mu**2)/mu, 0.01_wp, models(model) == 'surface')
     call check('slides at mu W', force/(mu*world%blocks%mass(1)*g), 1.0_wp + late/2, &
       0.01_wp + late/2)
     call check('awake in the current', .not. world%blocks%asleep(1))

@@ -39,7 +39,7 @@ contains
     type(problems_t) :: problems
 
     call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid &
-      //'&fluid water_level = 0.1 / &contact solver = ''springs'' '//contact//' /', case, problems)
+      //'&fluid water_level = 0.1 / &contact model = ''spheres'' '//contact//' /', case, problems)
     contact_input = contact_of(case)
     substep_ratio = contact_input%substep_ratio
   end function substep_ratio
@@ -114,8 +114,8 @@ contains
       //'name=''h'' kind=''hexapod'' size=.02 spheres=''centroid''/&shape name=''b'' ' &
       //'kind=''box'' size=.02,.03,.04/ &drop shape=''h'' position=1,2,3 tilt_deg=1/&drop ' &
       //'shape=''h'' position=1,2,3 orientation=''random''/ &water min=3*0 max=3*1/&fluid ' &
-      //'water_level=0.1513 single_phase=f/ &contact sleep=f law=''constants''/&numerics ' &
-      //'coupling=''mics'' coupling_passes=3 divergence_tolerance=1d-10/', case, problems)
+      //'water_level=0.1513 single_phase=f/ &contact sleep=f model=''spheres'' law=''constants''/' &
+      //'&numerics coupling=''mics'' coupling_passes=3 divergence_tolerance=1d-10/', case, problems)
     case%run%title = 'it''s "a" / test ! größe'
     call check('case for the way back', problems%n, 0)
     text = parameters_text(case)

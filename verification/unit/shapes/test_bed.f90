@@ -379,7 +379,7 @@ contains
     case%body(1)%position(3) = top + edge*sqrt(0.5_wp) - deep
     call make_shape(case%shape(1), shapes(1), message)
     call blocks_init(case, shapes, blocks)
-    call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
+    call contact_surface_init(1.0e-2_wp, blocks, contact)
     call find_surface_points(walls, blocks, 0.0_wp, contact, points)
     call check('an edge on a saddle touches it', points%n > 0)
     call check('its depth', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), 1.0e-12_wp)
