@@ -8,48 +8,36 @@ module cut_tets_m
   use share_lists_m, only: body_shares_t
   implicit none
   private
-  public :: cut_tets_t, list_cut_tets, faces_of_tet
+  public :: list_cut_tets, faces_of_tet
 
   real(wp), parameter :: near_face = 1.0e-12_wp    !! a gap that parts no cell from a tetrahedron
-
-  !> Work arrays over the box of a body, for one thread.
-  type :: cut_tets_t
-    integer, allocatable :: number(:, :, :)    !! place in the list of a cut cell, 0 elsewhere
-    integer, allocatable :: run(:, :, :)       !! (4, y, z) ends of the first run of cut cells,
-                                               !! of the rest
-    integer, allocatable :: pair(:, :)         !! (2, *) cell, tetrahedron
-  end type cut_tets_t
 
 contains
 
   !> Tetrahedra of the cut cells among the cells listed: all but those with the cell wholly outside
   !! one face.
-  subroutine list_cut_tets(work, self)
-    type(cut_tets_t), intent(inout) :: work
+  subroutine list_cut_tets(self)
     type(body_shares_t), intent(inout) :: self
+    integer, allocatable :: number(:, :, :)    ! place in the list of a cut cell, 0 elsewhere
+    integer, allocatable :: runs(:, :, :)      ! (4, y, z) ends of the first run of cut cells,
+                                               ! of the rest
+    integer, allocatable :: pair(:, :)         ! (2, *) cell, tetrahedron
     integer :: t, i, j, k, m, n_pair, low(3), high(3), first, last, c(3)
     real(wp) :: n(3, 4), d(4)
 
-    c = max(abs(self%low), abs(self%high)) + 1
-    if (allocated(work%number)) then   ! arrays long enough for the body; they only grow
-      if (any(ubound(work%number) < c)) then
-        c = max(c, ubound(work%number))
-        deallocate (work%number, work%run)
-      end if
-    end if
-    if (.not. allocated(work%number)) then
-      allocate (work%number(-c(1):c(1), -c(2):c(2), -c(3):c(3)), source=0)
-      allocate (work%run(4, -c(2):c(2), -c(3):c(3)))
-      call ensure_capacity(1, work%pair, rows=2)
-    end if
+    low = self%low - 1   ! a corner may lie beyond the facets by round-off
+    high = self%high + 1
+    allocate (number(low(1):high(1), low(2):high(2), low(3):high(3)), source=0)
+    allocate (runs(4, low(2):high(2), low(3):high(3)))
+    call ensure_capacity(1, pair, rows=2)
     ! Number the cut cells on the grid; in each row, ends of their first run, of all that follow.
-    work%run(1, self%low(2):self%high(2), self%low(3):self%high(3)) = 0
-    work%run(2, self%low(2):self%high(2), self%low(3):self%high(3)) = -1   ! no cut cells
+    runs(1, :, :) = 0
+    runs(2, :, :) = -1   ! no cut cells
     do m = 1, self%n_cell
       if (self%alpha(m) >= 1.0_wp) cycle
       c = self%cell(:, m)
-      work%number(c(1), c(2), c(3)) = m
-      associate (run => work%run(:, c(2), c(3)))
+      number(c(1), c(2), c(3)) = m
+      associate (run => runs(:, c(2), c(3)))
         if (run(1) > run(2)) then
           run = c(1)
         else
@@ -66,7 +54,7 @@ contains
       call faces_of_tet(self%corner(:, :, t), n, d)
       do k = low(3), high(3)
         do j = low(2), high(2)
-          associate (run => work%run(:, j, k))
+          associate (run => runs(:, j, k))
             first = max(low(1), run(1))
             last = min(high(1), run(4))
             if (run(1) > run(2) .or. first > last) cycle
@@ -74,18 +62,15 @@ contains
           end associate
           call row_range(n, d, j, k, first, last)
           do i = first, last
-            if (work%number(i, j, k) == 0) cycle
+            if (number(i, j, k) == 0) cycle
             n_pair = n_pair + 1
-            call ensure_capacity(n_pair, work%pair)
-            work%pair(:, n_pair) = [work%number(i, j, k), t]
+            call ensure_capacity(n_pair, pair)
+            pair(:, n_pair) = [number(i, j, k), t]
           end do
         end do
       end do
     end do
-    call sort_pairs(n_pair, work%pair, self)
-    do t = 1, self%n_cell
-      work%number(self%cell(1, t), self%cell(2, t), self%cell(3, t)) = 0
-    end do
+    call sort_pairs(n_pair, pair, self)
   end subroutine list_cut_tets
 
   !> Outward normals and plane constants of a tetrahedron: n.x <= d inside. One of negative volume,

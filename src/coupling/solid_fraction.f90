@@ -17,23 +17,16 @@ module solid_fraction_m
   use share_lists_m, only: body_shares_t
   use share_row_m, only: share_row_t
   use body_shares_m, only: find_body_shares
-  use cut_tets_m, only: cut_tets_t, list_cut_tets
-  use subcell_shares_m, only: subcell_work_t, count_subcells
+  use cut_tets_m, only: list_cut_tets
+  use subcell_shares_m, only: count_subcells
   use voxels_m, only: voxels_t, voxels_init, find_images, ensure_lists, place_bodies, &
     voxelise_cells, voxelise_faces, voxelise_links
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links, tets_of_cut_cells
   use effective_aperture_m, only: find_effective_apertures
-  use pockets_m, only: pockets_t, close_pockets
+  use pockets_m, only: close_pockets
   implicit none
   private
   public :: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
-
-  !> Work arrays of one thread.
-  type :: share_work_t
-    type(share_row_t) :: row
-    type(cut_tets_t) :: tets
-    type(subcell_work_t) :: count
-  end type share_work_t
 
   type :: solid_fraction_t
     type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body, and of the bed
@@ -41,9 +34,8 @@ module solid_fraction_m
     type(shape_t) :: bed                          !! the part of it in the grid, about its centre
     real(wp) :: bed_centre(3) = 0.0_wp            !! [m]
     integer :: subcells = 0                       !! per direction, 0: exact shares
-    type(share_work_t), allocatable :: work(:)    !! (threads)
+    type(share_row_t), allocatable :: row(:)      !! (threads) work arrays
     type(voxels_t) :: voxels
-    type(pockets_t) :: pockets
     integer :: poses = 0                          !! how often a body has moved, come or gone
     real(wp), allocatable :: x(:, :), q(:, :)     !! (3, n), (4, n) the poses of now
     logical, allocatable :: present(:)
@@ -79,9 +71,8 @@ contains
     allocate (self%x(3, n), self%q(4, n), source=0.0_wp)
     allocate (self%present(n), source=.false.)
     if (self%has_bed) n = n + 1
-    allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
+    allocate (self%body(n), self%row(0:omp_get_max_threads() - 1))
     call voxels_init(grid, n, self%voxels)
-    self%pockets = pockets_t(self%voxels%low, self%voxels%high)
   end subroutine solid_fraction_init
 
   !> Fill the solid geometry for the poses of the bodies present.
@@ -128,7 +119,7 @@ contains
     !$omp section
     call guard_links(self%voxels, solid)
     !$omp end parallel sections
-    call close_pockets(grid, self%pockets, solid)
+    call close_pockets(grid, self%voxels%low, self%voxels%high, solid)
     call find_effective_apertures(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
   end subroutine update_solid
 
@@ -141,9 +132,9 @@ contains
     logical :: changed
     integer :: b
 
-    if (size(self%work) < omp_get_max_threads()) then
-      deallocate (self%work)
-      allocate (self%work(0:omp_get_max_threads() - 1))
+    if (size(self%row) < omp_get_max_threads()) then
+      deallocate (self%row)
+      allocate (self%row(0:omp_get_max_threads() - 1))
     end if
     do b = 1, blocks%n
       self%voxels%near(b) = blocks%present(b)
@@ -154,19 +145,19 @@ contains
     !$omp parallel do private(changed) schedule(dynamic, 1) if (count(self%voxels%near) > 1)
     do b = 1, blocks%n
       if (.not. self%voxels%near(b)) cycle
-      associate (work => self%work(omp_get_thread_num()), body => self%body(b))
+      associate (body => self%body(b))
         call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), &
-                              blocks%q(:, b), work%row, body, changed)
-        if (changed .and. self%subcells > 0) call count_subcells(self%subcells, work%count, body)
-        if (changed) call list_cut_tets(work%tets, body)
+                              blocks%q(:, b), self%row(omp_get_thread_num()), body, changed)
+        if (changed .and. self%subcells > 0) call count_subcells(self%subcells, body)
+        if (changed) call list_cut_tets(body)
       end associate
     end do
     if (.not. self%has_bed) return
     ! the bed is near everywhere and has no images
     self%voxels%near(size(self%body)) = .true.
-    associate (work => self%work(0), body => self%body(size(self%body)))
-      call find_body_shares(grid, self%bed, self%bed_centre, upright, work%row, body, changed)
-      if (changed) call list_cut_tets(work%tets, body)
+    associate (body => self%body(size(self%body)))
+      call find_body_shares(grid, self%bed, self%bed_centre, upright, self%row(0), body, changed)
+      if (changed) call list_cut_tets(body)
     end associate
   end subroutine find_shares
 

@@ -16,54 +16,32 @@ module subcell_shares_m
   use cut_tets_m, only: faces_of_tet
   implicit none
   private
-  public :: subcell_work_t, count_subcells
-
-  !> Marks of one body, for one thread; they only grow.
-  type :: subcell_work_t
-    logical, allocatable :: cell(:, :, :)   !! sub-cells of the box around the body
-    logical, allocatable :: face(:, :, :)   !! squares of the faces of one direction
-    logical, allocatable :: full(:, :, :)   !! cells of which all sub-cells are solid
-  end type subcell_work_t
+  public :: count_subcells
 
 contains
 
   !> Put counted shares in place of the exact ones of a body whose lists are filled.
-  subroutine count_subcells(n, work, self)
+  subroutine count_subcells(n, self)
     integer, intent(in) :: n   !! sub-cells per direction
-    type(subcell_work_t), intent(inout) :: work
     type(body_shares_t), intent(inout) :: self
+    logical, allocatable :: solid(:, :, :)   ! sub-cells of the box around the body
+    logical, allocatable :: full(:, :, :)    ! cells of which all sub-cells are solid
+    logical, allocatable :: square(:, :, :)  ! of the faces of one direction: solid
     integer :: d, cells(3), squares(3)
 
     cells = self%high - self%low + 1
-    call reserve(n*cells, work%cell)
-    call reserve(cells + 1, work%full)
-    call mark_points(self, n*cells, spread(n, 1, 3), spread(0.5_wp, 1, 3), work%cell)
-    call count_cells(n, work, self)
+    allocate (full(cells(1) + 1, cells(2) + 1, cells(3) + 1), source=.false.)
+    call mark_points(self, n*cells, spread(n, 1, 3), spread(0.5_wp, 1, 3), solid)
+    call count_cells(n, solid, full, self)
     self%n_face = 0
     do d = 1, 3
       squares = n
       squares(d) = 1
-      call reserve(squares*cells, work%face)
       call mark_points(self, squares*cells, squares, &
-                       0.5_wp*real(1 - unit_step(:, d), wp), work%face)
-      call count_faces(n, d, squares, work, self)
+                       0.5_wp*real(1 - unit_step(:, d), wp), square)
+      call count_faces(n, d, squares, full, square, self)
     end do
   end subroutine count_subcells
-
-  !> An array at least this long.
-  subroutine reserve(n, mark)
-    integer, intent(in) :: n(3)
-    logical, allocatable, intent(inout) :: mark(:, :, :)
-    integer :: m(3)
-
-    m = n
-    if (allocated(mark)) then
-      if (all(shape(mark) >= n)) return
-      m = max(n, shape(mark))
-      deallocate (mark)
-    end if
-    allocate (mark(m(1), m(2), m(3)))
-  end subroutine reserve
 
   !> Points of a lattice over the box of the body that lie in one of its tetrahedra; those on a
   !! face of a tetrahedron count.
@@ -72,12 +50,12 @@ contains
     integer, intent(in) :: n(3)             !! points
     integer, intent(in) :: per_cell(3)      !! points in a cell
     real(wp), intent(in) :: shift(3)        !! of the first from the corner of the box [points]
-    logical, intent(inout) :: mark(:, :, :)
+    logical, allocatable, intent(out) :: mark(:, :, :)
     real(wp), parameter :: near = 1.0e-9_wp   !! points so near the box of a tetrahedron are tried
     real(wp) :: normal(3, 4), limit(4), x(3), corner(3)
     integer :: t, i, j, k, first(3), last(3)
 
-    mark(1:n(1), 1:n(2), 1:n(3)) = .false.
+    allocate (mark(n(1), n(2), n(3)), source=.false.)
     corner = real(self%low - 1, wp)
     do t = 1, size(self%corner, 3)
       associate (c => self%corner(:, :, t))
@@ -98,13 +76,13 @@ contains
   end subroutine mark_points
 
   !> Shares, centroids and full cells; cells without a solid sub-cell leave the list.
-  subroutine count_cells(n, work, self)
+  subroutine count_cells(n, solid, full, self)
     integer, intent(in) :: n
-    type(subcell_work_t), intent(inout) :: work
+    logical, intent(in) :: solid(:, :, :)   !! sub-cells
+    logical, intent(inout) :: full(:, :, :)
     type(body_shares_t), intent(inout) :: self
     integer :: m, kept, count, i, j, k, c(3), s(3), total(3)
 
-    work%full = .false.
     kept = 0
     do m = 1, self%n_cell
       c = self%cell(:, m) - self%low
@@ -114,7 +92,7 @@ contains
         do j = 1, n
           do i = 1, n
             s = n*c + [i, j, k]
-            if (.not. work%cell(s(1), s(2), s(3))) cycle
+            if (.not. solid(s(1), s(2), s(3))) cycle
             count = count + 1
             total = total + [i, j, k]
           end do
@@ -125,16 +103,17 @@ contains
       self%cell(:, kept) = self%cell(:, m)
       self%alpha(kept) = real(count, wp)/real(n**3, wp)
       self%centroid(:, kept) = (real(total, wp)/real(count, wp) - 0.5_wp)/real(n, wp)
-      work%full(c(1) + 1, c(2) + 1, c(3) + 1) = count == n**3
+      full(c(1) + 1, c(2) + 1, c(3) + 1) = count == n**3
       self%inside(kept) = self%inside(m) .or. count == n**3
     end do
     self%n_cell = kept
   end subroutine count_cells
 
   !> Shares and centroids of the lower faces in direction d.
-  subroutine count_faces(n, d, squares, work, self)
+  subroutine count_faces(n, d, squares, full, square, self)
     integer, intent(in) :: n, d, squares(3)   !! squares of a face in each direction
-    type(subcell_work_t), intent(in) :: work
+    logical, intent(in) :: full(:, :, :)      !! cells
+    logical, intent(in) :: square(:, :, :)    !! solid ones
     type(body_shares_t), intent(inout) :: self
     integer :: i, j, k, a, b, count, c(3), s(3), below(3), total(3)
 
@@ -143,7 +122,7 @@ contains
         do i = 1, self%high(1) - self%low(1) + 1
           c = [i, j, k]
           below = max(c - unit_step(:, d), 1)
-          if (work%full(i, j, k) .or. work%full(below(1), below(2), below(3))) then
+          if (full(i, j, k) .or. full(below(1), below(2), below(3))) then
             call add_face([c + self%low - 1, d], [1.0_wp, 0.5_wp, 0.5_wp], self)
             cycle
           end if
@@ -154,7 +133,7 @@ contains
               s(d) = c(d)
               s(along(d)) = squares(along(d))*(c(along(d)) - 1) + a
               s(up(d)) = squares(up(d))*(c(up(d)) - 1) + b
-              if (.not. work%face(s(1), s(2), s(3))) cycle
+              if (.not. square(s(1), s(2), s(3))) cycle
               count = count + 1
               total(1:2) = total(1:2) + [a, b]
             end do
