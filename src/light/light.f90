@@ -46,14 +46,13 @@ module light_m
     real(wp) :: displaced_start = 0.0_wp          !! below it at t = 0 [m3]
     real(wp) :: bottom = 0.0_wp                   !! of the tank [m]
     real(wp) :: level = 0.0_wp                    !! [m]
-    real(wp), allocatable :: wet(:), wet_before(:)   !! (n) V_w now and in the step before [m3]
+    real(wp), allocatable :: wet(:)               !! (n) V_w [m3]
     real(wp), allocatable :: moment(:, :)         !! (3, n) K_w about the centre [m4]
     real(wp), allocatable :: cut_at(:)            !! (n) level at which a block at rest was cut [m]
     real(wp), allocatable :: inverse(:, :, :)     !! (3, 3, shapes) inverse inertia [1/(kg m2)]
     real(wp), allocatable :: force(:, :)          !! (6, n) buoyancy and drag [N, N m]
     real(wp), allocatable :: start(:, :)
       !! (6, n) velocity and own angular momentum at the start of a step [m/s, kg m2/s]
-    real(wp), allocatable :: x(:, :), lost(:, :), q(:, :)   !! poses likewise, q (4, n)
   end type light_t
 
 contains
@@ -99,7 +98,7 @@ contains
         light%inverse(:, :, s) = inverse3(shape%inertia)
       end associate
     end do
-    allocate (light%wet(blocks%n), light%wet_before(blocks%n), source=0.0_wp)
+    allocate (light%wet(blocks%n), source=0.0_wp)
     allocate (light%cut_at(blocks%n), source=-huge(1.0_wp))
     allocate (light%moment(3, blocks%n), light%force(6, blocks%n), light%start(6, blocks%n), &
       source=0.0_wp)
@@ -166,32 +165,33 @@ contains
     type(blocks_t), intent(inout) :: blocks
     logical, intent(inout) :: initialised(:)    !! (n) blocks that were here before
     type(light_t), intent(inout) :: light
-    real(wp) :: before   ! V_w [m3]
+    real(wp), dimension(3, blocks%n) :: x, lost   ! poses at the start of the step
+    real(wp) :: q(4, blocks%n)
+    real(wp) :: wet(blocks%n)                     ! V_w in the step before [m3]
     logical :: rests
     integer :: b
     real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
 
-    light%wet_before = light%wet
-    light%x = blocks%x
-    light%lost = blocks%lost
-    light%q = blocks%q
+    wet = light%wet
+    x = blocks%x
+    lost = blocks%lost
+    q = blocks%q
     call drift(0.5_wp*dt, blocks)
     call find_level(blocks, light)
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      before = light%wet_before(b)
       light%start(1:3, b) = blocks%v(:, b)
-      light%start(4:6, b) = blocks%l(:, b)/growth(light, blocks, b, before)
+      light%start(4:6, b) = blocks%l(:, b)/growth(light, blocks, b, wet(b))
       rests = blocks%asleep(b) .or. (blocks%fixed(b) .and. all(abs(blocks%v(:, b)) <= 0.0_wp) &
                                      .and. all(abs(blocks%omega(:, b)) <= 0.0_wp))
-      if (.not. (initialised(b) .and. rests .and. abs(light%wet(b) - before) <= 0.0_wp)) then
+      if (.not. (initialised(b) .and. rests .and. abs(light%wet(b) - wet(b)) <= 0.0_wp)) then
         ! Let free block b carry what is below the level now. Water that comes along takes momentum
         ! from it, water left behind takes its own away.
         if (.not. blocks%fixed(b)) then
           call load_block(b, light, blocks)
-          left = (loaded_mass(light, blocks, b, before)/blocks%mass(b))**entry_loss
-          turned = growth(light, blocks, b, before)/growth(light, blocks, b, light%wet(b))
-          if (initialised(b) .and. light%wet(b) > before) then
+          left = (loaded_mass(light, blocks, b, wet(b))/blocks%mass(b))**entry_loss
+          turned = growth(light, blocks, b, wet(b))/growth(light, blocks, b, light%wet(b))
+          if (initialised(b) .and. light%wet(b) > wet(b)) then
             blocks%v(:, b) = light%current + left*(blocks%v(:, b) - light%current)
             blocks%omega(:, b) = turned*blocks%omega(:, b)
           else
@@ -205,9 +205,9 @@ contains
         - (blocks%mass(b) - own_mass(blocks, b))*gravity
       blocks%fluid_torque(:, b) = light%force(4:6, b)
     end do
-    blocks%x = light%x
-    blocks%lost = light%lost
-    blocks%q = light%q
+    blocks%x = x
+    blocks%lost = lost
+    blocks%q = q
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle
       blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
