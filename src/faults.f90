@@ -53,16 +53,15 @@ contains
       'the flow of the start did not converge', fault)
     if (report%contact%info /= 0) call set_fault(sim, 'a step would need more than a million ' &
       //'body steps: blocks are too fast, or `contact_time` or `substep_ratio` too small', fault)
-    if (.not. report%transport_converged) then
-      call set_fault(sim, 'what small cells of the transport give did not converge', fault)
-    end if
-    if (.not. report%coupling%viscous_converged) call set_fault(sim, 'the viscous stage did not ' &
-      //'converge', fault)
-    associate (pressure => report%coupling%pressure)
-      if (sim%wet .and. .not. pressure%converged) call set_fault(sim, 'divergence ' &
-        //to_text(pressure%divergence)//' 1/s after '//to_text(pressure%passes) &
+    if (sim%wet) then
+      if (.not. sim%transport%liquid%small%converged) call set_fault(sim, &
+        'what small cells of the transport give did not converge', fault)
+      if (.not. sim%coupling%viscous%converged) call set_fault(sim, &
+        'the viscous stage did not converge', fault)
+      if (.not. report%pressure%converged) call set_fault(sim, 'divergence ' &
+        //to_text(report%pressure%divergence)//' 1/s after '//to_text(report%pressure%passes) &
         //' passes: above `divergence_tolerance`', fault)
-    end associate
+    end if
     if (sim%energy%known) then   ! else the excess is NaN
       if (report%energy_excess > excess_max) call set_fault(sim, 'fluid and blocks have ' &
         //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was ' &

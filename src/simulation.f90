@@ -51,7 +51,6 @@ module simulation_m
     type(deep_overlaps_t) :: deep
     logical :: wet = .true.                !! there is a flow of water and air
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
-    real(wp) :: next_let_go = huge(1.0_wp)   !! when a lowered block will be let go [s]
     logical, allocatable :: initialised(:)        !! blocks whose motion in the fluid has begun
     logical, allocatable :: pending(:)     !! blocks that are due, found no room and were warned of
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0

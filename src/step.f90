@@ -70,13 +70,15 @@ contains
     type(step_report_t), intent(out) :: report
     type(stage_t) :: stage
     real(wp) :: dt_before   ! of the last step [s]
+    real(wp) :: next_let_go   ! when a lowered block will be let go [s]
+    real(wp) :: cfl_carried   ! largest share of itself that a cell gives [-]
     real(wp) :: depth       ! [m]
 
     dt_before = sim%clock%dt
     ! 1 release
-    call release(sim, report)
+    call release(sim, report, next_let_go)
     ! 2 time step
-    call choose_step(sim, report)
+    call choose_step(next_let_go, sim, report%cfl, cfl_carried)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                coupling => sim%coupling, dt => sim%clock%dt, scratch => sim%scratch, &
                liquid => sim%transport%liquid)
@@ -95,7 +97,7 @@ contains
         call toc(sim%timer_solid)
         ! 6 fluxes
         call tic(sim%timer_transport)
-        call begin_carrying(report%cfl_carried, scratch, sim%transport)
+        call begin_carrying(cfl_carried, scratch, sim%transport)
         call begin_transport(grid, sim%before, sim%solid, dt, coupling%pressure%system%solver, &
                              liquid, flow)
         ! 7 advection
@@ -119,10 +121,10 @@ contains
         ! 12 faces
         call coupling%predict_faces(stage)
         ! 13 projection
-        call coupling%project(stage, report%coupling)
+        call coupling%project(stage)
         ! 14 closing
         call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
-        call coupling%close(stage, blocks, report%coupling)
+        call coupling%close(stage, blocks)
         call toc(sim%timer_velocity)
       end if
     end associate
@@ -174,16 +176,17 @@ contains
     call store_energy(energies(sim, report%fluid, report%contact%energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%subcycles
-    report%transport_converged = sim%transport%liquid%small%converged
+    report%pressure = sim%coupling%pressure%report
     report%inertia_clips = report%inertia_clips + count(sim%coupling%bodies%clipped)
     report%curvature_fallback = sim%coupling%tension%surface%fallback
   end subroutine describe
 
   !> Blocks that have passed an open side go; those whose time has come enter, with the force and
   !! the pressure with which they begin to move.
-  subroutine release(sim, report)
+  subroutine release(sim, report, next_let_go)
     type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(inout) :: report
+    real(wp), intent(out) :: next_let_go   !! when a lowered block will be let go, huge: none [s]
     type(fluid_sums_t) :: fluid
     logical :: released
 
@@ -192,7 +195,7 @@ contains
     call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%pending, &
                             report%warnings, released)
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
-                        sim%next_let_go, report%warnings)
+                        next_let_go, report%warnings)
     if (.not. sim%wet) return
     if (released) then   ! the liquid in their place raises the free surface
       call voxelise(sim)
@@ -221,7 +224,7 @@ contains
         if (stand(b)) stand(b) = stands(sim%walls, blocks, b, sim%overlap)
       end do
       call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
-        sim%clock%dt), begins .and. .not. stand, force)
+        sim%case%run%dt), begins .and. .not. stand, force)
       do b = 1, blocks%n
         if (.not. begins(b)) cycle
         blocks%fluid_force(:, b) = force(1:3, b)
@@ -265,9 +268,11 @@ contains
   !> Length of the step: `cfl_max` of liquid and blocks, `&run dt` and surface tension, or less to
   !! land on a release or on the end. With fluid at most `growth_max` times the step before, whose
   !! pressure and acceleration this one begins with.
-  subroutine choose_step(sim, report)
+  subroutine choose_step(next_let_go, sim, cfl, cfl_carried)
+    real(wp), intent(in) :: next_let_go   !! when a lowered block will be let go [s]
     type(simulation_t), intent(inout) :: sim
-    type(step_report_t), intent(inout) :: report
+    real(wp), intent(out) :: cfl           !! of liquid and blocks [-]
+    real(wp), intent(out) :: cfl_carried   !! largest share of itself that a cell gives [-]
     type(courant_rate_t) :: rate
     real(wp) :: allowed, h
 
@@ -285,10 +290,9 @@ contains
           viscous_step(sim%case%fluid, sum(1.0_wp/sim%grid%h**2, sim%grid%n > 1)))
       end if
     end if
-    call sim%clock%choose_step(allowed, min(sim%next_let_go, &
-                                            next_release(sim%clock%t, sim%blocks)))
-    report%cfl = sim%clock%dt*rate%followed
-    report%cfl_carried = sim%clock%dt*rate%carried
+    call sim%clock%choose_step(allowed, min(next_let_go, next_release(sim%clock%t, sim%blocks)))
+    cfl = sim%clock%dt*rate%followed
+    cfl_carried = sim%clock%dt*rate%carried
   end subroutine choose_step
 
 end module step_m

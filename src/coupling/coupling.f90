@@ -15,14 +15,14 @@ module coupling_m
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
-  use pressure_m, only: pressure_t, pressure_report_t, pressure_init
+  use pressure_m, only: pressure_t, pressure_init
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
                              cell_mean_of_faces
   use surface_tension_m, only: surface_tension_t, surface_tension_init, find_tension, add_tension
   use rigid_body_m, only: blocks_t, space_tensor, set_velocity_after_fluid
   implicit none
   private
-  public :: coupling_t, coupling_report_t, coupling_init, copy_motion, push_bodies, move_by_forces
+  public :: coupling_t, coupling_init, copy_motion, push_bodies, move_by_forces
   public :: by_old_pressure, by_displaced, by_half_kick, by_viscosity
   public :: by_new_pressure, by_walls
   public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
@@ -38,14 +38,8 @@ module coupling_m
   integer, parameter :: by_walls = 7          !! of the walls
   integer, parameter :: n_forces = 7
 
-  type :: coupling_report_t
-    type(pressure_report_t) :: pressure
-    logical :: viscous_converged = .true.
-  end type coupling_report_t
-
   type, abstract :: coupling_t
     type(fluid_t) :: fluid
-    real(wp) :: dt_release = 0.0_wp                !! in which a block begins to move [s]
     type(rigid_motion_t) :: bodies
     type(rigid_motion_t) :: expected
       !! the motion at the end of the step with the forces of the fluid in the last one
@@ -54,7 +48,7 @@ module coupling_m
     type(viscous_t) :: viscous
     logical :: implicit_momentum = .false.         !! advection by C-ISMAC, in the predictor
     type(c_ismac_t) :: c_ismac                     !! allocated for it only
-    type(pressure_t) :: pressure
+    type(pressure_t) :: pressure                   !! its report is that of the step
     type(surface_tension_t) :: tension
     type(acceleration_t) :: acceleration
     real(wp), allocatable :: unforced_motion(:, :)   !! (6, n) by weight and contact alone
@@ -69,7 +63,7 @@ module coupling_m
     procedure(of_stage), deferred :: add_forces
     procedure(of_stage), deferred :: add_viscosity
     procedure(of_stage), deferred :: predict_faces
-    procedure(of_projection), deferred :: project
+    procedure(of_stage), deferred :: project
     procedure(of_end), deferred :: close
   end type coupling_t
 
@@ -79,7 +73,8 @@ module coupling_m
       import :: coupling_t, stage_t, wp
       implicit none
       class(coupling_t), intent(inout) :: self   !! its bodies in place
-      type(stage_t), intent(in) :: s             !! of its flow only the pressure changes
+      type(stage_t), intent(in) :: s
+        !! with the time in which a block begins to move; of the flow only the pressure changes
       logical, intent(in) :: begins(:)           !! (blocks) those let go; all others are held
       real(wp), intent(out) :: force(:, :)
     end subroutine of_release
@@ -93,7 +88,8 @@ module coupling_m
       type(blocks_t), intent(in) :: blocks
     end subroutine of_start
 
-    !> A stage after the transport: fluid and bodies are where the step ends.
+    !> A stage after the transport: fluid and bodies are where the step ends. After `project`
+    !! pressure, velocity of faces, cells and bodies are final, force and torque on each body known.
     subroutine of_stage(self, s)
       import :: coupling_t, stage_t
       implicit none
@@ -101,23 +97,13 @@ module coupling_m
       type(stage_t), intent(in) :: s
     end subroutine of_stage
 
-    !> Pressure; velocity of faces, cells and bodies; force and torque of the step on each body.
-    subroutine of_projection(self, s, report)
-      import :: coupling_t, stage_t, coupling_report_t
-      implicit none
-      class(coupling_t), intent(inout) :: self
-      type(stage_t), intent(in) :: s
-      type(coupling_report_t), intent(inout) :: report
-    end subroutine of_projection
-
     !> The faces as the next step carries fluid through them, with the final motion of the bodies.
-    subroutine of_end(self, s, blocks, report)
-      import :: coupling_t, stage_t, blocks_t, coupling_report_t
+    subroutine of_end(self, s, blocks)
+      import :: coupling_t, stage_t, blocks_t
       implicit none
       class(coupling_t), intent(inout) :: self
       type(stage_t), intent(in) :: s
       type(blocks_t), intent(inout) :: blocks
-      type(coupling_report_t), intent(inout) :: report
     end subroutine of_end
   end interface
 
@@ -131,7 +117,6 @@ contains
     class(coupling_t), intent(inout) :: self
 
     self%fluid = case%fluid
-    self%dt_release = case%run%dt
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
     call rigid_motion_init(n, self%expected)

@@ -22,12 +22,12 @@ module mass_average_m
   use viscous_links_m, only: build_viscous
   use momentum_c_ismac_m, only: advected_velocity
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: solve_pressure, both_solves, divergence
+  use pressure_m, only: pressure_report_t, solve_pressure, both_solves, divergence
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
   use buoyancy_m, only: displaced_force
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
-  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, move_by_forces, &
+  use coupling_m, only: coupling_t, coupling_init, move_by_forces, &
     by_displaced, by_new_pressure, &
     accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
   use rigid_body_m, only: blocks_t
@@ -188,10 +188,10 @@ contains
 
   !> Stage 13: projection of the mixture and the force on the bodies; `coupling_passes` times, later
   !! passes from the mean by mass alone.
-  subroutine project(self, s, report)
+  subroutine project(self, s)
     class(mass_average_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
-    type(coupling_report_t), intent(inout) :: report
+    type(pressure_report_t) :: before   ! of the passes so far
     integer :: pass
 
     associate (grid => s%grid, flow => s%flow, a => self%acceleration)
@@ -204,15 +204,14 @@ contains
           call fill_velocity_halo(grid, flow%u)
           call predict_face_velocity(grid, s%dt, self%rho, a, flow)
         end if
+        before = self%pressure%report
         call project_mixture(s, self)
-        if (pass > 1) self%pressure%report = both_solves(report%pressure, self%pressure%report)
-        report%pressure = self%pressure%report
+        if (pass > 1) self%pressure%report = both_solves(before, self%pressure%report)
         call momentum_gained(grid, s%solid, s%dt, flow%u, self)
         call move_by_forces(s%dt, self)
       end do
     end associate
     self%total = sum(self%force, 3)
-    report%viscous_converged = self%viscous%converged
   end subroutine project
 
   !> Density of fluid and solids in each cell: rho = (1 - alpha) rho_fl + sum alpha_k rho_k [kg/m3].
@@ -336,11 +335,10 @@ contains
 
   !> Stage 14: give cells and faces the final rigid velocity by mass average; what divergence that
   !! leaves is reported, since it is what the next step transports with.
-  subroutine overlay_bodies(self, s, blocks, report)
+  subroutine overlay_bodies(self, s, blocks)
     class(mass_average_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     type(blocks_t), intent(inout) :: blocks
-    type(coupling_report_t), intent(inout) :: report
     integer :: b, d, m, i(3), low(3)
     real(wp) :: rigid(3), share
 
@@ -368,7 +366,7 @@ contains
                                       *flow%uf(:, :, :, d)
       end do
       call divergence(grid, solid%aperture, flow, system%active, system%solver%rhs, &
-                      report%pressure%divergence)
+                      self%pressure%report%divergence)
     end associate
   end subroutine overlay_bodies
 

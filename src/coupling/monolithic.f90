@@ -18,7 +18,7 @@ module monolithic_m
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: solve_pressure, both_solves
+  use pressure_m, only: pressure_report_t, solve_pressure, both_solves
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
   use effective_aperture_m, only: hold_in_cells
@@ -35,7 +35,7 @@ module monolithic_m
                             store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
-  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, move_by_forces, &
+  use coupling_m, only: coupling_t, coupling_init, push_bodies, move_by_forces, &
     by_old_pressure, by_displaced, by_half_kick, by_viscosity, by_new_pressure, by_walls, &
     accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
   use rigid_body_m, only: blocks_t, change_by_motion
@@ -301,28 +301,27 @@ contains
   !> Stage 13: pressure and motion of the bodies in one solve. What the walls bear
   !! (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure follows in a
   !! second solve; the little that this one changes of it is left to the next step.
-  subroutine project(self, s, report)
+  subroutine project(self, s)
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
-    type(coupling_report_t), intent(inout) :: report
     real(wp), dimension(6, self%bodies%n) :: of_walls, without
+    type(pressure_report_t) :: rough   ! of the first solve
     integer :: b
 
     associate (bodies => self%bodies, pressure => self%pressure)
       self%left_over = 0.0_wp
       if (any(bodies%free)) then
         call solve_once(s, rough_factor*pressure%tolerance, self, of_walls)
-        report%pressure = pressure%report
+        rough = pressure%report
         self%force(:, :, by_walls) = of_walls
         call move_by_forces(s%dt, self)
         call solve_once(s, pressure%tolerance, self, of_walls)
-        report%pressure = both_solves(report%pressure, pressure%report)
+        pressure%report = both_solves(rough, pressure%report)
         do b = 1, bodies%n
           if (bodies%free(b)) self%left_over(:, b) = of_walls(:, b) - self%force(:, b, by_walls)
         end do
       else
         call solve_once(s, pressure%tolerance, self, of_walls)
-        report%pressure = pressure%report
         self%force(:, :, by_walls) = of_walls
       end if
       call impose_rigid_velocity(s%grid, s%solid, self%merged, bodies, s%flow%u)
@@ -337,7 +336,6 @@ contains
           + matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%unforced_motion(:, b))/s%dt
       end do
     end associate
-    report%viscous_converged = self%viscous%converged
   end subroutine project
 
   !> Pressure and motion of the bodies, the cells after them, and the force that the walls bear so
@@ -375,14 +373,11 @@ contains
 
   !> Stage 14: the velocity of all the fluid in a face, held fluid included, and the flux of the
   !! solids; what is left of the force of the walls acts in the next step.
-  subroutine close_faces(self, s, blocks, report)
+  subroutine close_faces(self, s, blocks)
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
     type(blocks_t), intent(inout) :: blocks
-    type(coupling_report_t), intent(inout) :: report
 
-    associate (unused => report)
-    end associate
     blocks%lagged_force = self%left_over(:, :blocks%n)
     blocks%film_force = self%of_films(:, :blocks%n)
     call all_fluid_of_faces(s%grid, s%solid, self%bodies, self%pressure%system%operator%flux, &
@@ -425,20 +420,18 @@ contains
   !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.
   subroutine force_at_release(self, s, begins, force)
     class(monolithic_t), intent(inout) :: self   !! its bodies in place
-    type(stage_t), intent(in) :: s               !! of its flow only the pressure changes
+    type(stage_t), intent(in) :: s
+      !! with the time in which they begin to move; of the flow only the pressure changes
     logical, intent(in) :: begins(:)             !! (blocks) those let go; all others are held
     real(wp), intent(out) :: force(:, :)         !! (6, bodies), buoyancy of the others [N, N m]
     real(wp), parameter :: weightless(3) = 0.0_wp
     real(wp), allocatable :: uf(:, :, :, :), solid_flux(:, :, :, :)
-    type(stage_t) :: release
     type(rigid_motion_t) :: moving
     real(wp) :: a(6)
     integer :: b
 
-    release = s
-    release%dt = self%dt_release
     moving = self%bodies
-    associate (grid => s%grid, solid => s%solid, flow => s%flow, dt => release%dt, &
+    associate (grid => s%grid, solid => s%solid, flow => s%flow, dt => s%dt, &
                bodies => self%bodies, system => self%pressure%system)
       allocate (uf, source=flow%uf)
       allocate (solid_flux, source=flow%solid_flux)
@@ -456,7 +449,7 @@ contains
       call set_fluid_inertia(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
-      call solve_pressure(release, flow%rho, bodies, self%pressure)
+      call solve_pressure(s, flow%rho, bodies, self%pressure)
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
         a = bodies%motion(:, b)/dt

@@ -10,7 +10,7 @@ module diagnostics_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use contacts_m, only: contact_report_t
-  use coupling_m, only: coupling_report_t
+  use pressure_m, only: pressure_report_t
   use rigid_body_m, only: kinetic_energy, potential_energy
   use state_m, only: run_state_t
   implicit none
@@ -29,11 +29,9 @@ module diagnostics_m
   !> The report of one fluid step with its body substeps.
   type :: step_report_t
     real(wp) :: cfl = 0.0_wp                  !! Courant number of liquid and blocks [-]
-    real(wp) :: cfl_carried = 0.0_wp          !! largest share of itself that a cell gives [-]
     integer :: transport_parts = 0            !! in which the volumes of the step moved
-    logical :: transport_converged = .true.
     type(contact_report_t) :: contact
-    type(coupling_report_t) :: coupling       !! its divergence is that which the next step uses
+    type(pressure_report_t) :: pressure       !! its divergence is that which the next step uses
     real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m],
     logical :: overlap_known = .false.        !! measured for rows only
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
@@ -64,9 +62,9 @@ contains
       quantity_t('time', 's', state%clock%t), &
       quantity_t('dt', 's', state%clock%dt), &
       quantity_t('cfl', '1', wet(report%cfl)), &
-      quantity_t('divergence_max', '1/s', wet(report%coupling%pressure%divergence)), &
-      quantity_t('pressure_passes', '1', wet(real(report%coupling%pressure%passes, wp))), &
-      quantity_t('solver_iterations', '1', wet(real(report%coupling%pressure%iterations, wp))), &
+      quantity_t('divergence_max', '1/s', wet(report%pressure%divergence)), &
+      quantity_t('pressure_passes', '1', wet(real(report%pressure%passes, wp))), &
+      quantity_t('solver_iterations', '1', wet(real(report%pressure%iterations, wp))), &
       quantity_t('liquid_volume', 'm3', wet(report%fluid%liquid_volume)), &
       quantity_t('liquid_volume_drift', '1', wet(drift())), &
       quantity_t('volume_excess_max', '1', wet(report%fluid%excess_max)), &

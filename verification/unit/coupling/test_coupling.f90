@@ -9,7 +9,7 @@ module test_coupling_m
   use monolithic_m, only: monolithic_t, monolithic_init
   use flow_start_m, only: start_flow
   use rigid_motion_m, only: set_inertia
-  use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
+  use coupling_m, only: copy_motion, start_of_stages, motion_after_fluid
   use boundary_m, only: fill_velocity_halo
   use case_types_m, only: case_t
   use case_text_m, only: case_of, sides, body
@@ -22,7 +22,6 @@ module test_coupling_m
   type(case_t) :: case
   type(one_body_t), target :: block
   type(monolithic_t) :: coupling
-  type(coupling_report_t) :: report
   type(scratch_t), target :: scratch
   logical :: begun = .false.   !! has `begin` gone before?
 
@@ -87,13 +86,12 @@ contains
     call start_of_stages(case%fluid%gravity, dt, block%blocks, coupling)
     call stages()
     call motion_after_fluid(case%fluid%gravity, dt, block%blocks, coupling)
-    call coupling%close(stage(), block%blocks, report)
+    call coupling%close(stage(), block%blocks)
   end subroutine advance
 
   !> Those between two looks at the motion of the block. Without `begin` nothing has been given
   !! before the transport, and the faces are as their cells.
   subroutine stages()
-    report = coupling_report_t()
     if (.not. begun) then
       coupling%correction = 0.0_wp
       coupling%kick = 0.0_wp
@@ -104,7 +102,7 @@ contains
     call coupling%add_forces(stage())
     call coupling%add_viscosity(stage())
     call coupling%predict_faces(stage())
-    call coupling%project(stage(), report)
+    call coupling%project(stage())
   end subroutine stages
 
   !> Before its first step the sphere has the force of that fall, and the fluid the pressure of it,
@@ -152,8 +150,9 @@ contains
     gain(1:3) = block%blocks%mass(1)*(coupling%bodies%motion(1:3, 1) - motion(1:3))
     gain(4:6) = matmul(coupling%bodies%inertia(:, :, 1), &
                        coupling%bodies%motion(4:6, 1) - motion(4:6))
-    call check('box: converged', report%pressure%converged .and. report%viscous_converged)
-    call check('box: divergence', report%pressure%divergence < 1.0e-8_wp)
+    call check('box: converged', coupling%pressure%report%converged &
+               .and. coupling%viscous%converged)
+    call check('box: divergence', coupling%pressure%report%divergence < 1.0e-8_wp)
     ! To the tolerance of the viscous solver.
     call check('box: momentum by the solve is that of the force', gain(1:3), &
                dt*coupling%total(1:3, 1), 1.0e-9_wp*norm2(gain(1:3)))
