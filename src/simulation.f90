@@ -33,7 +33,7 @@ module simulation_m
   use stage_m, only: stage_t
   use clock_m, only: clock_init
   use state_m, only: run_state_t
-  use timers_m, only: timer
+  use timers_m, only: name_phase
   implicit none
   private
   public :: simulation_t, simulation_init, resume, measure, energies
@@ -53,7 +53,6 @@ module simulation_m
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
     logical, allocatable :: initialised(:)        !! blocks whose motion in the fluid has begun
     logical, allocatable :: pending(:)     !! blocks that are due, found no room and were warned of
-    integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
   end type simulation_t
 
 contains
@@ -72,10 +71,10 @@ contains
     case ('dry', 'light'); sim%wet = .false.
     case default; error stop 'simulation_init: no such physics'
     end select
-    sim%timer_blocks = timer('blocks')
-    sim%timer_solid = timer('solid shares')
-    sim%timer_transport = timer('transport')
-    sim%timer_velocity = timer('velocity and pressure')
+    call name_phase('blocks')
+    call name_phase('solid shares')
+    call name_phase('transport')
+    call name_phase('velocity and pressure')
     call clock_init(case%run, sim%clock)
     call grid_init(case%grid, case%boundary, sim%grid)
     call walls_init(case%grid, case%boundary, sim%walls)

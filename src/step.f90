@@ -85,18 +85,18 @@ contains
       ! 3 half kick
       if (sim%wet) call begin(sim, dt_before, report%inertia_clips)
       ! 4 bodies
-      call tic(sim%timer_blocks)
+      call tic('blocks')
       if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%initialised, sim%light)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, report%contact)
       if (sim%light%on) call store_water_force(case%fluid%gravity, dt, blocks, sim%light)
-      call toc(sim%timer_blocks)
+      call toc('blocks')
       if (sim%wet) then
         ! 5 voxelise
-        call tic(sim%timer_solid)
+        call tic('solid shares')
         call voxelise(sim)
-        call toc(sim%timer_solid)
+        call toc('solid shares')
         ! 6 fluxes
-        call tic(sim%timer_transport)
+        call tic('transport')
         call begin_carrying(cfl_carried, scratch, sim%transport)
         call begin_transport(grid, sim%before, sim%solid, dt, coupling%pressure%system%solver, &
                              liquid, flow)
@@ -106,8 +106,8 @@ contains
         call finish_carrying(grid, sim%solid, flow, scratch, sim%transport)
         ! 8 mixture
         call mix_fluid(case%fluid, flow)
-        call toc(sim%timer_transport)
-        call tic(sim%timer_velocity)
+        call toc('transport')
+        call tic('velocity and pressure')
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
         call start_of_stages(case%fluid%gravity, dt, blocks, coupling)
         stage = stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, dt)
@@ -125,7 +125,7 @@ contains
         ! 14 closing
         call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
         call coupling%close(stage, blocks)
-        call toc(sim%timer_velocity)
+        call toc('velocity and pressure')
       end if
     end associate
     sim%clock%t = sim%clock%t_next
@@ -135,10 +135,10 @@ contains
     if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
     else if (sim%contacts%exact) then
-      call tic(sim%timer_blocks)   ! for warnings and faults only where bodies have deep contacts
+      call tic('blocks')   ! for warnings and faults only where bodies have deep contacts
       call ask_for_deep(sim%contacts%points, sim%blocks, sim%deep)
       call max_overlap(sim%walls, sim%blocks, sim%overlap, depth, sim%deep)
-      call toc(sim%timer_blocks)
+      call toc('blocks')
     end if
     if (.not. sim%contacts%exact) call store_points(sim%contacts%points, sim%deep)
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
@@ -150,10 +150,10 @@ contains
     type(step_report_t), intent(inout) :: report
 
     if (report%overlap_known) return
-    call tic(sim%timer_blocks)
+    call tic('blocks')
     sim%deep%asked = .true.
     call max_overlap(sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
-    call toc(sim%timer_blocks)
+    call toc('blocks')
     report%overlap_known = .true.
   end subroutine measure_overlap
 

@@ -10,7 +10,7 @@ module exact_sum_m
   use exact_accumulator_m, only: accumulator_size, no_terms, chunk_size, add_terms, &
                                  merge_accumulators, accumulator_value
   use parallel_m, only: global_sum_accumulators
-  use timers_m, only: timer, tic, toc
+  use timers_m, only: tic, toc
   implicit none
   private
   public :: exact_sum, exact_dot, exact_dots
@@ -115,13 +115,11 @@ contains
   subroutine exact_totals(accumulator, s)
     integer(i8), intent(inout), contiguous :: accumulator(:, :)   !! (accumulator_size, sums)
     real(wp), intent(out) :: s(:)
-    integer, save :: phase = 0   ! its number, once named
     integer :: m
 
-    if (phase == 0) phase = timer('sums over processes')
-    call tic(phase)
+    call tic('sums over processes')
     call global_sum_accumulators(accumulator)
-    call toc(phase)
+    call toc('sums over processes')
     do m = 1, size(s)
       s(m) = accumulator_value(accumulator(:, m))
     end do

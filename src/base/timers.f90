@@ -1,12 +1,12 @@
 !> Wall time spent in each phase of the run.
 !!
-!! A phase is named once, `pressure = timer('pressure')`, then timed with `call tic(pressure)` and
-!! `call toc(pressure)`. Phases may nest; the time of the inner one counts in both.
+!! A phase is timed from `call tic('blocks')` to `call toc('blocks')`; phases may nest, the time of
+!! the inner one counts in both. One that is named before is listed even if it never begins.
 module timers_m
   use kinds_m, only: wp, i8, name_length
   implicit none
   private
-  public :: timer, tic, toc, wall_clock
+  public :: name_phase, tic, toc, wall_clock
 
   integer, parameter :: max_timers = 64
 
@@ -22,31 +22,36 @@ module timers_m
 
 contains
 
-  !> Number of the phase of this name, new or already known.
-  function timer(name) result(id)
+  !> Number of the phase of this name, which is new or already known.
+  subroutine name_phase(name, number)
     character(*), intent(in) :: name
+    integer, intent(out), optional :: number
     integer :: id
 
     do id = 1, n_phases
-      if (phase(id)%name == name) return
+      if (phase(id)%name == name) exit
     end do
-    if (n_phases == max_timers) error stop 'timer: more phases than max_timers'
-    n_phases = n_phases + 1
-    phase(n_phases)%name = name
-    id = n_phases
-  end function timer
+    if (id > max_timers) error stop 'name_phase: more phases than max_timers'
+    phase(id)%name = name
+    n_phases = max(n_phases, id)
+    if (present(number)) number = id
+  end subroutine name_phase
 
   !> The phase begins.
-  subroutine tic(id)
-    integer, intent(in) :: id
+  subroutine tic(name)
+    character(*), intent(in) :: name
+    integer :: id
 
+    call name_phase(name, id)
     phase(id)%began = wall_clock()
   end subroutine tic
 
   !> The phase ends.
-  subroutine toc(id)
-    integer, intent(in) :: id
+  subroutine toc(name)
+    character(*), intent(in) :: name
+    integer :: id
 
+    call name_phase(name, id)
     phase(id)%seconds = phase(id)%seconds + (wall_clock() - phase(id)%began)
     phase(id)%calls = phase(id)%calls + 1
   end subroutine toc

@@ -6,7 +6,7 @@ module output_m
   use kinds_m, only: wp, i8
   use errors_m, only: exit_ok, exit_files
   use parallel_m, only: broadcast, is_root
-  use timers_m, only: timer, tic, toc, wall_clock
+  use timers_m, only: name_phase, tic, toc, wall_clock
   use command_line_m, only: options_t
   use case_types_m, only: case_t, fluid_t, not_resolved
   use bed_m, only: bed_t
@@ -39,7 +39,6 @@ module output_m
     integer, private :: next_restart = 1     !! file to write next
     !> Step of the last of each; -1: none yet.
     integer, private :: row_step = -1, frame_step = -1, restart_step = -1
-    integer, private :: phase = 0, restart_phase = 0         !! timers
     type(run_file_t), private :: run_file
     type(field_file_t), private :: field_file
     type(block_file_t), private :: block_file
@@ -63,9 +62,8 @@ contains
 
     output%message = ''
     output%restart_file = options%restart
-    output%phase = timer('output')
-    output%restart_phase = timer('restart files')
-    call tic(output%phase)
+    call tic('output')
+    call name_phase('restart files')
     output%run_file%text = case%text
     output%run_file%parameters = parameters
     output%properties = case%fluid
@@ -86,7 +84,7 @@ contains
       call output%lock%release()
     end if
     call output%progress%start(options%quiet, fluid, state%light%on, state%clock)
-    call toc(output%phase)
+    call toc('output')
   end subroutine open_output
 
   !> Folder of a run that starts anew, and who asks for it.
@@ -241,7 +239,7 @@ contains
     real(wp) :: now   ! [s]
 
     if (output%code /= exit_ok) return
-    call tic(output%phase)
+    call tic('output')
     output%progress%warnings = output%progress%warnings + report%warnings
     call output%progress%store_clips(state%clock%t, report%inertia_clips)
     row_wanted = state%clock%rows%due(state%clock%t) .and. output%row_step /= state%clock%step
@@ -259,7 +257,7 @@ contains
       output%next_look = now + look_interval
     end if
     call check_files(output)
-    call toc(output%phase)
+    call toc('output')
     if (state%clock%step > 0 .and. state%clock%restarts%due(state%clock%t)) then
       call state%clock%restarts%done(state%clock%t)   ! what is in it counts it as written
       call save_state(state, output)
@@ -297,7 +295,7 @@ contains
 
     call watch_folder(output)
     if (output%code /= exit_ok) return
-    call tic(output%restart_phase)
+    call tic('restart files')
     associate (name => restart_name(output%next_restart), lock => output%lock)
       part = name//'.part'
       call lock%remove(part)   ! of a run that was killed
@@ -309,7 +307,7 @@ contains
     end associate
     output%next_restart = 3 - output%next_restart
     output%restart_step = state%clock%step
-    call toc(output%restart_phase)
+    call toc('restart files')
     if (info == 0) return
     output%code = exit_files
     output%message = message
