@@ -46,7 +46,6 @@ module mass_average_m
     type(solid_geometry_t) :: whole                !! the domain without solids
     real(wp), allocatable :: rho(:, :, :)          !! of the mixture of fluid and solid [kg/m3]
     real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor [m/s]
-    real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
   contains
     procedure :: force_at_release
     procedure :: begin
@@ -76,7 +75,6 @@ contains
     call solid_geometry_init(grid, self%whole, n)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%terms(0, 6))
   end subroutine mass_average_init
 
   !> Archimedes' force: the mixture makes the inertia of the fluid.
@@ -305,15 +303,12 @@ contains
     class(mass_average_t), intent(inout) :: self
     integer(i8) :: accumulator(accumulator_size, 6*self%bodies%n)
     real(wp) :: total(6*self%bodies%n), f(3)
+    real(wp), allocatable :: terms(:, :)   ! (cells of a body, 6)
     integer :: b, m, n
 
     accumulator = spread(no_terms, 2, 6*self%bodies%n)
     do b = 1, self%bodies%n
-      n = solid%body_cell(b + 1) - solid%body_cell(b)
-      if (size(self%terms, 1) < n) then
-        deallocate (self%terms)
-        allocate (self%terms(2*n, 6))
-      end if
+      allocate (terms(solid%body_cell(b + 1) - solid%body_cell(b), 6))
       n = 0
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
@@ -321,12 +316,13 @@ contains
           n = n + 1
           f = solid%cell_alpha(m)*grid%volume*self%rho(i(1), i(2), i(3))/dt &
               *(u(i(1), i(2), i(3), :) - self%u_before(i(1), i(2), i(3), :))
-          self%terms(n, 1:3) = f
-          self%terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), &
-                                                  self%bodies%x(:, b)), f)
+          terms(n, 1:3) = f
+          terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), &
+                                            self%bodies%x(:, b)), f)
         end associate
       end do
-      call exact_add_columns(self%terms(1:n, :), accumulator(:, 6*b - 5:6*b))
+      call exact_add_columns(terms(1:n, :), accumulator(:, 6*b - 5:6*b))
+      deallocate (terms)
     end do
     call exact_totals(accumulator, total)
     self%force(:, :, by_new_pressure) = self%force(:, :, by_new_pressure) &

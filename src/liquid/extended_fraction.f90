@@ -9,7 +9,6 @@
 module extended_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
@@ -33,11 +32,6 @@ module extended_fraction_m
 
   type :: extended_fraction_t
     type(vertical_t) :: vertical
-    integer :: n = 0                        !! cells with solid on this process
-    integer, allocatable :: cell(:, :)      !! (3, *) those cells
-    integer, allocatable :: open_list(:)    !! cells still without a value
-    logical, allocatable :: has_plane(:)    !! (*) cut cell that keeps the share below its own plane
-    real(wp), allocatable :: value(:)       !! (*)
     type(cut_cell_t), allocatable :: cut(:) !! one per thread, from 0
   end type extended_fraction_t
 
@@ -71,6 +65,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid   !! of the same time as the liquid
     type(extended_fraction_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
+    integer, allocatable :: cell(:, :)       ! (3, *) of this process that hold solid
+    logical, allocatable :: has_plane(:)     ! (*) cut cell that keeps the share below its own plane
     integer :: pass, i, j, k, l, n
 
     ! C^ = W/Vt where there is no solid, unknown elsewhere.
@@ -86,68 +82,67 @@ contains
       end do
     end do
     ! The cells of this process that hold solid; all of them still lack a value.
+    associate (a => grid%lo, b => grid%hi)
+      n = count(solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)) > 0.0_wp)
+    end associate
+    allocate (cell(3, n))
     n = 0
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (solid%alpha(i, j, k) <= 0.0_wp) cycle
           n = n + 1
-          call ensure_capacity(n, self%cell)
-          self%cell(:, n) = [i, j, k]
+          cell(:, n) = [i, j, k]
         end do
       end do
     end do
-    self%n = n
-    call ensure_capacity(n, self%open_list)
-    call ensure_capacity(n, self%has_plane)
-    call ensure_capacity(n, self%value)
-    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
-    self%has_plane(1:self%n) = .true.
+    call spread_sideways(grid, solid, self%vertical%axis, cell, flow)
+    allocate (has_plane(n), source=.true.)
     do pass = 1, plane_passes
-      call planes_of_cut_cells(grid, solid, flow%liquid, flow%fluid_volume, pass == 1, self, flow%c)
+      call planes_of_cut_cells(grid, solid, cell, pass == 1, self, has_plane, flow)
     end do
     ! Cells almost or fully solid lose their value again, to get that of the finished row.
-    do l = 1, self%n
-      associate (at => self%cell(:, l))
+    do l = 1, n
+      associate (at => cell(:, l))
         if (nearly_solid(solid, at)) flow%c(at(1), at(2), at(3)) = unknown
       end associate
     end do
-    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
+    call spread_sideways(grid, solid, self%vertical%axis, cell, flow)
     call fill_scalar_halo(grid, flow%c)
   end subroutine extend_fraction
 
   !> Give cells without a value the mean of their neighbours in the row, ring by ring; where a whole
   !! row has none, one step up and down, and on along the row.
-  subroutine spread_sideways(grid, solid, liquid, fluid_volume, self, c)
+  subroutine spread_sideways(grid, solid, axis, cell, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, fluid_volume
-    type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: axis         !! the vertical, 0: there is none
+    integer, intent(in) :: cell(:, :)   !! (3, *) with solid
+    type(flow_t), intent(inout) :: flow
+    integer :: open_list(size(cell, 2))   ! cells still without a value
     integer :: left, l
     integer(i8) :: count(2)   ! values found in this pass, cells left
     logical :: sideways
 
     left = 0
-    do l = 1, self%n
-      associate (at => self%cell(:, l))
-        if (c(at(1), at(2), at(3)) >= 0.0_wp) cycle
+    do l = 1, size(cell, 2)
+      associate (at => cell(:, l))
+        if (flow%c(at(1), at(2), at(3)) >= 0.0_wp) cycle
       end associate
       left = left + 1
-      self%open_list(left) = l
+      open_list(left) = l
     end do
-    sideways = self%vertical%axis > 0
+    sideways = axis > 0
     do
       count(2) = int(left, i8)
-      call halo_exchange(c, n_halo, layers=1)
-      call spread_once(grid, solid, sideways, self, left, c)
+      call halo_exchange(flow%c, n_halo, layers=1)
+      call spread_once(grid, solid, merge(axis, 0, sideways), cell, open_list, left, flow%c)
       count(1) = count(2) - int(left, i8)
       count(2) = int(left, i8)
       call global_sum(count)
       if (count(2) == 0_i8) exit
       if (count(1) > 0_i8) then
-        sideways = self%vertical%axis > 0
+        sideways = axis > 0
       else if (sideways) then
         sideways = .false.
       else
@@ -155,36 +150,38 @@ contains
       end if
     end do
     do l = 1, left   ! sealed in: what the cell itself holds
-      associate (at => self%cell(:, self%open_list(l)))
-        c(at(1), at(2), at(3)) = liquid_share(liquid(at(1), at(2), at(3)), &
-                                              fluid_volume(at(1), at(2), at(3)))
+      associate (at => cell(:, open_list(l)))
+        flow%c(at(1), at(2), at(3)) = liquid_share(flow%liquid(at(1), at(2), at(3)), &
+                                                   flow%fluid_volume(at(1), at(2), at(3)))
       end associate
     end do
-    call halo_exchange(c, n_halo, layers=1)
+    call halo_exchange(flow%c, n_halo, layers=1)
   end subroutine spread_sideways
 
   !> One ring: new values only from values of before the pass. Cells that find one leave the list.
-  subroutine spread_once(grid, solid, sideways, self, left, c)
+  subroutine spread_once(grid, solid, across, cell, open_list, left, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    logical, intent(in) :: sideways   !! only within the row
-    type(extended_fraction_t), intent(inout) :: self
-    integer, intent(inout) :: left    !! cells in the list
+    integer, intent(in) :: across            !! direction that is not looked along; 0: all are
+    integer, intent(in) :: cell(:, :)        !! (3, *)
+    integer, intent(inout) :: open_list(:)   !! numbers of those without a value
+    integer, intent(inout) :: left           !! of them in the list
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp) :: value(left)
     integer :: l, kept, at(3)
 
     !$omp parallel do schedule(dynamic, 64) if (left > worth_threads)
     do l = 1, left
-      self%value(self%open_list(l)) = mean_of_neighbours(self%cell(:, self%open_list(l)))
+      value(l) = mean_of_neighbours(cell(:, open_list(l)))
     end do
     kept = 0
     do l = 1, left
-      at = self%cell(:, self%open_list(l))
-      if (self%value(self%open_list(l)) >= 0.0_wp) then
-        c(at(1), at(2), at(3)) = self%value(self%open_list(l))
+      at = cell(:, open_list(l))
+      if (value(l) >= 0.0_wp) then
+        c(at(1), at(2), at(3)) = value(l)
       else
         kept = kept + 1
-        self%open_list(kept) = self%open_list(l)
+        open_list(kept) = open_list(l)
       end if
     end do
     left = kept
@@ -201,7 +198,7 @@ contains
       first = unknown
       sum = 0.0_wp
       do d = 1, 3
-        if (sideways .and. d == self%vertical%axis) cycle
+        if (d == across) cycle
         do s = 0, 1
           f = at + s*unit_step(:, d)
           nb = at + (2*s - 1)*unit_step(:, d)
@@ -222,68 +219,65 @@ contains
 
   !> Cut cells: accept the row's value, which stands in c, or put the share below the own plane
   !! there.
-  subroutine planes_of_cut_cells(grid, solid, liquid, fluid_volume, may_accept, self, c)
+  subroutine planes_of_cut_cells(grid, solid, cell, may_accept, self, has_plane, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, fluid_volume
+    integer, intent(in) :: cell(:, :)   !! (3, *) with solid
     logical, intent(in) :: may_accept   !! first pass; later only cells with an own plane take part
     type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(inout) :: has_plane(:)
+    type(flow_t), intent(inout) :: flow
+    real(wp) :: value(size(cell, 2))
     integer :: l, at(3)
 
     !$omp parallel do private(at) schedule(dynamic, 8)
-    do l = 1, self%n
-      at = self%cell(:, l)
-      if (nearly_solid(solid, at)) self%has_plane(l) = .false.
-      if (.not. self%has_plane(l)) cycle
-      call share_of_cut_cell(grid, solid, liquid_share(liquid(at(1), at(2), at(3)), &
-        fluid_volume(at(1), at(2), at(3))), may_accept, c, l, self)
+    do l = 1, size(cell, 2)
+      at = cell(:, l)
+      if (nearly_solid(solid, at)) has_plane(l) = .false.
+      if (has_plane(l)) call share_of_cut_cell(at, liquid_share(flow%liquid(at(1), at(2), at(3)), &
+        flow%fluid_volume(at(1), at(2), at(3))), has_plane(l), value(l))
     end do
-    do l = 1, self%n
-      at = self%cell(:, l)
-      if (self%has_plane(l)) c(at(1), at(2), at(3)) = self%value(l)
+    do l = 1, size(cell, 2)
+      at = cell(:, l)
+      if (has_plane(l)) flow%c(at(1), at(2), at(3)) = value(l)
     end do
-    call halo_exchange(c, n_halo, layers=1)
-  end subroutine planes_of_cut_cells
+    call halo_exchange(flow%c, n_halo, layers=1)
+  contains
+    !> Is the row's value, which stands in c, good for a cell (then it has no plane), and which
+    !! share lies below its own plane if not?
+    subroutine share_of_cut_cell(at, share, has_plane, value)
+      integer, intent(in) :: at(3)
+      real(wp), intent(in) :: share   !! liquid share of its open part
+      logical, intent(inout) :: has_plane
+      real(wp), intent(out) :: value
+      real(wp) :: m(3), a, held, open, row
 
-  !> Cell l of the list: is the row's value, which stands in c, good for it (then it has no plane),
-  !! and which share lies below its own plane if not?
-  subroutine share_of_cut_cell(grid, solid, share, may_accept, c, l, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: share         !! liquid share of its open part
-    logical, intent(in) :: may_accept
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(in) :: l
-    type(extended_fraction_t), intent(inout) :: self
-    real(wp) :: m(3), a, held, open, row
-
-    associate (at => self%cell(:, l), cut => self%cut(omp_get_thread_num()))
-      self%value(l) = share
-      row = c(at(1), at(2), at(3))
+      value = share
+      row = flow%c(at(1), at(2), at(3))
       open = 1.0_wp - solid%alpha(at(1), at(2), at(3))
       if (may_accept .and. ((row <= same_liquid .and. share*open <= same_liquid) .or. &
           (row >= 1.0_wp - same_liquid .and. (1.0_wp - share)*open <= same_liquid))) then
-        self%has_plane(l) = .false.
+        has_plane = .false.
         return
       end if
       if (row <= same_liquid .or. row >= 1.0_wp - same_liquid) then
         if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
       end if
-      m = surface_normal(grid, solid, self%vertical, c, at(1), at(2), at(3))
-      call load_cut_cell(solid, solid%cut(at(1), at(2), at(3)), grid%face(at, [1, 2, 3]), grid%h, &
-                         cut)
-      if (may_accept .and. row > 0.0_wp .and. row < 1.0_wp) then
-        call open_below(cut, m, unit_constant(m, row), held)
-        self%has_plane(l) = .not. abs(held - share*cut%open) <= same_liquid
-        if (.not. self%has_plane(l)) return
-      end if
-      if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
-      call open_constant(cut, m, share*cut%open, a)
-      self%value(l) = unit_volume(m, a)
-    end associate
-  end subroutine share_of_cut_cell
+      m = surface_normal(grid, solid, self%vertical, flow%c, at(1), at(2), at(3))
+      associate (cut => self%cut(omp_get_thread_num()))
+        call load_cut_cell(solid, solid%cut(at(1), at(2), at(3)), grid%face(at, [1, 2, 3]), &
+                           grid%h, cut)
+        if (may_accept .and. row > 0.0_wp .and. row < 1.0_wp) then
+          call open_below(cut, m, unit_constant(m, row), held)
+          has_plane = .not. abs(held - share*cut%open) <= same_liquid
+          if (.not. has_plane) return
+        end if
+        if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
+        call open_constant(cut, m, share*cut%open, a)
+        value = unit_volume(m, a)
+      end associate
+    end subroutine share_of_cut_cell
+  end subroutine planes_of_cut_cells
 
   !> Has this cell too little open space for a value of its own?
   pure function nearly_solid(solid, at) result(yes)

@@ -6,7 +6,6 @@
 module liquid_sweep_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
-  use growing_m, only: ensure_capacity
   use case_types_m, only: absent, is_given
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_kinds_m, only: side_inflow, side_outflow
@@ -33,9 +32,6 @@ module liquid_sweep_m
       !! largest change by the round-off guard of a slab in the step, of this process [V]
     real(wp), allocatable :: out_low(:, :, :), out_high(:, :, :)
       !! liquid that leaves a cell by its lower and its upper face [m3]
-    integer :: n_mixed = 0
-    integer, allocatable :: mixed_cell(:, :)  !! (3, *) cells whose planes are needed
-    integer, allocatable :: in_plane(:)       !! (lo(3):hi(3)+1) mixed cells below a plane of cells
     type(cut_cell_t), allocatable :: cut(:)   !! one per thread, from 0
   end type liquid_sweep_t
 
@@ -53,7 +49,6 @@ contains
     self%vertical = vertical_of(gravity)
     allocate (self%out_low(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%out_high, source=self%out_low)
-    allocate (self%in_plane(grid%lo(3):grid%hi(3) + 1), source=0)
     allocate (self%cut(0:omp_get_max_threads() - 1))
     do t = 0, size(self%cut) - 1
       call cut_cell_init(self%cut(t))
@@ -68,6 +63,7 @@ contains
     type(carried_volumes_t), intent(inout) :: volumes
     type(liquid_sweep_t), intent(inout) :: self
     integer :: i, j, k, e(3), s, a(3), b(3)
+    integer, allocatable :: mixed(:, :)   ! (3, *) cells whose planes are needed
     real(wp), allocatable :: spare(:, :, :)
     real(wp) :: share
 
@@ -86,8 +82,8 @@ contains
         end do
       end do
     end do
-    call list_mixed_cells(grid, d, volumes, self)
-    call plane_outflow(grid, old, d, volumes, self)
+    call list_mixed_cells(grid, d, volumes, mixed)
+    call plane_outflow(grid, old, d, mixed, volumes, self)
     call halo_exchange(self%out_low, n_halo, d)
     call halo_exchange(self%out_high, n_halo, d)
     ! Liquid that comes in through the sides of the domain, as outflow of the halo cell behind them.
@@ -120,36 +116,36 @@ contains
   end subroutine sweep_volumes
 
   !> Cells with liquid and gas that give volume in direction d, in the order of the grid.
-  subroutine list_mixed_cells(grid, d, volumes, self)
+  subroutine list_mixed_cells(grid, d, volumes, cell)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d
     type(carried_volumes_t), intent(in) :: volumes
-    type(liquid_sweep_t), intent(inout) :: self
+    integer, allocatable, intent(out) :: cell(:, :)       !! (3, *)
+    integer :: in_plane(grid%lo(3):grid%hi(3) + 1)   ! such cells below a plane of cells
     integer :: i, j, k, n
 
-    self%in_plane = 0
+    in_plane = 0
     !$omp parallel do private(i, j) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          if (needs_plane(i, j, k)) self%in_plane(k + 1) = self%in_plane(k + 1) + 1
+          if (needs_plane(i, j, k)) in_plane(k + 1) = in_plane(k + 1) + 1
         end do
       end do
     end do
     do k = grid%lo(3), grid%hi(3)
-      self%in_plane(k + 1) = self%in_plane(k + 1) + self%in_plane(k)
+      in_plane(k + 1) = in_plane(k + 1) + in_plane(k)
     end do
-    self%n_mixed = self%in_plane(grid%hi(3) + 1)
-    call ensure_capacity(self%n_mixed, self%mixed_cell)
+    allocate (cell(3, in_plane(grid%hi(3) + 1)))
     !$omp parallel do private(i, j, n) schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      n = self%in_plane(k)
-      if (self%in_plane(k + 1) == n) cycle
+      n = in_plane(k)
+      if (in_plane(k + 1) == n) cycle
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (.not. needs_plane(i, j, k)) cycle
           n = n + 1
-          self%mixed_cell(:, n) = [i, j, k]
+          cell(:, n) = [i, j, k]
         end do
       end do
     end do
@@ -170,10 +166,11 @@ contains
   end subroutine list_mixed_cells
 
   !> Liquid that leaves the mixed cells, by their planes.
-  subroutine plane_outflow(grid, old, d, volumes, self)
+  subroutine plane_outflow(grid, old, d, mixed, volumes, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old
     integer, intent(in) :: d
+    integer, intent(in) :: mixed(:, :)   !! (3, *) those cells
     type(carried_volumes_t), intent(in) :: volumes
     type(liquid_sweep_t), intent(inout) :: self
     integer :: l, i, j, k, f(3), s
@@ -182,10 +179,10 @@ contains
     largest = 0.0_wp
     !$omp parallel do private(i, j, k, f, m, w, v, out, liquid, clamped, w_left, v_left, before, &
     !$omp a, s) reduction(max: largest) schedule(dynamic, 16)
-    do l = 1, self%n_mixed
-      i = self%mixed_cell(1, l)
-      j = self%mixed_cell(2, l)
-      k = self%mixed_cell(3, l)
+    do l = 1, size(mixed, 2)
+      i = mixed(1, l)
+      j = mixed(2, l)
+      k = mixed(3, l)
       f = [i, j, k] + unit_step(:, d)
       w = volumes%w(i, j, k)
       v = volumes%v(i, j, k)

@@ -41,7 +41,7 @@ module liquid_transport_m
     type(extended_fraction_t) :: extension
     integer :: subcycles = 1                 !! equal subcycles in which the volumes of a step move;
                                               !! the caller sets it before the step
-    integer :: order(3) = [1, 2, 3]           !! directions of the sweeps of this subcycle
+    integer :: order(3) = 0                   !! directions of the sweeps of this subcycle
     real(wp) :: inflow = 0.0_wp               !! of liquid through the sides in this step [m3]
     real(wp), allocatable :: side(:)          !! work: liquid through the faces of the sides [m3]
   end type liquid_transport_t

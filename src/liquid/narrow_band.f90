@@ -16,19 +16,8 @@ module narrow_band_m
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: narrow_band_t, narrow_band_init, reserve, reserve_for_all, find_parts, sum_by_part, &
-            drop_part, find_open_lines
-
-  !> Work of finding and sorting the parts.
-  type :: part_finder_t
-    integer, allocatable :: root(:)          !! of a cell: the first of its part on this process;
-                                             !! then the cells by part
-    integer, allocatable :: part(:)          !! of a cell: smallest number in its part, then the
-                                             !! number of the part; then work
-    integer(i8), allocatable :: home(:)      !! (parts) labels, rising
-    integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
-    integer(i8), allocatable :: accumulator(:, :)   !! of the sums
-  end type part_finder_t
+  public :: narrow_band_t, narrow_band_init, reserve_for_all, find_parts, sum_by_part, drop_part, &
+            find_open_lines
 
   type, extends(linear_operator_t) :: narrow_band_t
     ! Arrays over cells with one halo cell.
@@ -52,9 +41,7 @@ module narrow_band_m
     integer :: parts = 0
     integer, allocatable :: first(:)         !! (parts + 1)
     integer(i8), allocatable :: vents(:)     !! (parts) cells at an open side
-    real(wp), allocatable :: largest(:)      !! (parts) largest |r|, for the user of the band [V]
     real(wp), allocatable :: total(:)        !! (2 parts) sums of r, then of the open volume [V]
-    type(part_finder_t) :: finder
   contains
     procedure :: apply => apply_band
   end type narrow_band_t
@@ -65,7 +52,6 @@ contains
   subroutine narrow_band_init(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(out) :: self
-    integer, parameter :: first_parts = 64
     integer :: a(3), b(3)
 
     a = grid%lo - 1
@@ -74,33 +60,8 @@ contains
     allocate (self%number, self%label, source=self%marked)
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%line(2, size(self%marked, 2), size(self%marked, 3)), source=0)
-    allocate (self%finder%held(0:nproc() - 1), source=0_i8)
-    call ensure_capacity(1, self%cell)
-    call reserve(self)
-    call allocate_parts(first_parts, self)
+    allocate (self%cell(3, 0), self%r(0), self%open(0))
   end subroutine narrow_band_init
-
-  subroutine allocate_parts(n, self)
-    integer, intent(in) :: n
-    type(narrow_band_t), intent(inout) :: self
-
-    allocate (self%first(n + 1), self%vents(n), self%largest(n), self%total(2*n))
-    allocate (self%finder%home(n), self%finder%accumulator(accumulator_size, 2*n))
-  end subroutine allocate_parts
-
-  !> Room in the lists for all cells.
-  subroutine reserve(self)
-    type(narrow_band_t), intent(inout) :: self
-    integer :: n
-
-    n = size(self%cell, 2)
-    call ensure_capacity(n, self%r)
-    call ensure_capacity(n, self%open)
-    associate (f => self%finder)
-      call ensure_capacity(n, f%root)
-      call ensure_capacity(n, f%part)
-    end associate
-  end subroutine reserve
 
   !> Room in the lists for all own cells and no more; what they held is lost.
   subroutine reserve_for_all(grid, self)
@@ -110,8 +71,8 @@ contains
 
     n = product(grid%hi - grid%lo + 1)
     if (size(self%cell, 2) >= n) return
-    deallocate (self%cell, self%r, self%open, self%finder%root, self%finder%part)
-    allocate (self%cell(3, n), self%r(n), self%open(n), self%finder%root(n), self%finder%part(n))
+    deallocate (self%cell, self%r, self%open)
+    allocate (self%cell(3, n), self%r(n), self%open(n))
   end subroutine reserve_for_all
 
   !> Number of a cell in the whole domain, from 1.
@@ -166,11 +127,13 @@ contains
   subroutine find_parts(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
+    integer :: part(self%n)   ! of a cell: the first of its part here, then the number of its part
+    integer(i8), allocatable :: home(:)   ! (parts) labels, rising
     integer :: l, c(3), d, e(3), m, a, b
 
-    ! Join cells of this process across faces with a conductance: `root` of each cell of the list.
+    ! Join cells of this process across faces with a conductance.
     do l = 1, self%n
-      self%finder%root(l) = l
+      part(l) = l
     end do
     do l = 1, self%n
       c = self%cell(:, l)
@@ -179,23 +142,22 @@ contains
         e = c - unit_step(:, d)
         m = self%number(e(1), e(2), e(3))
         if (m == 0) cycle
-        call find_root(self%finder%root, l, a)
-        call find_root(self%finder%root, m, b)
-        self%finder%root(max(a, b)) = min(a, b)
+        call find_root(part, l, a)
+        call find_root(part, m, b)
+        part(max(a, b)) = min(a, b)
       end do
     end do
     do l = 1, self%n
-      call find_root(self%finder%root, l, self%finder%part(l))
+      call find_root(part, l, a)
+      part(l) = a
     end do
-    self%finder%root(1:self%n) = self%finder%part(1:self%n)
-    call join_processes(grid, self)
-    call list_parts(grid, self)
+    call join_processes(grid, part, self)
+    call list_parts(grid, self, home)
     do l = 1, self%n
       c = self%cell(:, l)
-      self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &
-                                     self%finder%home(1:self%parts))
+      part(l) = position(int(self%label(c(1), c(2), c(3)), i8), home)
     end do
-    call sort_by_part(self)
+    call sort_by_part(part, self)
   end subroutine find_parts
 
   !> Root of a cell; the path to it is shortened for the next call.
@@ -212,74 +174,71 @@ contains
   end subroutine find_root
 
   !> Give all cells of a connected part, on whatever process, the smallest global number in it.
-  subroutine join_processes(grid, self)
+  subroutine join_processes(grid, root, self)
     type(grid_t), intent(in) :: grid
+    integer, intent(in) :: root(:)   !! of a cell: the first of its part on this process
     type(narrow_band_t), intent(inout) :: self
+    integer :: smallest(self%n)   ! number in the part of a root, so far
     integer :: l, c(3), d, s, f(3), nb(3)
     integer(i8) :: changes(1)
 
-    associate (smallest => self%finder%part)
-      do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
-        smallest(l) = global_number(grid, self%cell(:, l))
+    do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
+      smallest(l) = global_number(grid, self%cell(:, l))
+    end do
+    self%label = 0
+    do
+      do l = 1, self%n
+        c = self%cell(:, l)
+        self%label(c(1), c(2), c(3)) = smallest(root(l))
       end do
-      self%label = 0
-      do
-        do l = 1, self%n
-          c = self%cell(:, l)
-          self%label(c(1), c(2), c(3)) = smallest(self%finder%root(l))
-        end do
-        call halo_exchange(self%label, 1)
-        changes = 0_i8
-        do l = 1, self%n
-          c = self%cell(:, l)
-          if (all(c > grid%lo .and. c < grid%hi)) cycle
-          ! Take over a smaller label from a neighbour behind an open face.
-          do d = 1, 3
-            do s = 0, 1
-              f = c + s*unit_step(:, d)
-              nb = c + (2*s - 1)*unit_step(:, d)
-              if (.not. self%k(f(1), f(2), f(3), d) > 0.0_wp) cycle
-              if (self%label(nb(1), nb(2), nb(3)) == 0) cycle
-              if (self%label(nb(1), nb(2), nb(3)) >= smallest(self%finder%root(l))) cycle
-              smallest(self%finder%root(l)) = self%label(nb(1), nb(2), nb(3))
-              changes = changes + 1_i8
-            end do
+      call halo_exchange(self%label, 1)
+      changes = 0_i8
+      do l = 1, self%n
+        c = self%cell(:, l)
+        if (all(c > grid%lo .and. c < grid%hi)) cycle
+        ! Take over a smaller label from a neighbour behind an open face.
+        do d = 1, 3
+          do s = 0, 1
+            f = c + s*unit_step(:, d)
+            nb = c + (2*s - 1)*unit_step(:, d)
+            if (.not. self%k(f(1), f(2), f(3), d) > 0.0_wp) cycle
+            if (self%label(nb(1), nb(2), nb(3)) == 0) cycle
+            if (self%label(nb(1), nb(2), nb(3)) >= smallest(root(l))) cycle
+            smallest(root(l)) = self%label(nb(1), nb(2), nb(3))
+            changes = changes + 1_i8
           end do
         end do
-        call global_sum(changes)
-        if (changes(1) == 0_i8) exit
       end do
-    end associate
+      call global_sum(changes)
+      if (changes(1) == 0_i8) exit
+    end do
   end subroutine join_processes
 
   !> The labels of all parts on all processes, rising.
-  subroutine list_parts(grid, self)
+  subroutine list_parts(grid, self, home)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
+    integer(i8), allocatable, intent(out) :: home(:)
+    integer(i8), allocatable :: held(:)   ! (0:processes-1) labels that each process gave
     integer :: l, c(3), rank, n
 
     rank = my_rank()
-    self%finder%held = 0_i8
+    allocate (held(0:nproc() - 1), source=0_i8)
     do l = 1, self%n
-      if (is_home(l)) self%finder%held(rank) = self%finder%held(rank) + 1_i8
+      if (is_home(l)) held(rank) = held(rank) + 1_i8
     end do
-    call global_sum(self%finder%held)
-    self%parts = int(sum(self%finder%held))
-    if (self%parts > size(self%finder%home)) then
-      deallocate (self%first, self%vents, self%largest, self%total)
-      deallocate (self%finder%home, self%finder%accumulator)
-      call allocate_parts(2*self%parts, self)
-    end if
-    self%finder%home(1:self%parts) = 0_i8
-    n = int(sum(self%finder%held(0:rank - 1)))
+    call global_sum(held)
+    self%parts = int(sum(held))
+    allocate (home(self%parts), source=0_i8)
+    n = int(sum(held(0:rank - 1)))
     do l = 1, self%n
       if (.not. is_home(l)) cycle
       n = n + 1
       c = self%cell(:, l)
-      self%finder%home(n) = int(global_number(grid, c), i8)
+      home(n) = int(global_number(grid, c), i8)
     end do
-    call global_sum(self%finder%home(1:self%parts))
-    call sort(self%finder%home(1:self%parts))
+    call global_sum(home)
+    call sort(home)
   contains
     !> Is this the cell that gave its part the label?
     logical function is_home(l)
@@ -328,11 +287,13 @@ contains
   end function position
 
   !> Stable sort of the cells by part; `first` marks where each begins.
-  subroutine sort_by_part(self)
+  subroutine sort_by_part(part, self)
+    integer, intent(inout) :: part(:)   !! of a cell; lost
     type(narrow_band_t), intent(inout) :: self
-    integer :: l, c, d
+    integer :: order(self%n), l, c, d
 
-    associate (part => self%finder%part, order => self%finder%root, n => self%n)
+    call ensure_capacity(self%parts + 1, self%first)
+    associate (n => self%n)
       self%first(1:self%parts + 1) = 0
       do l = 1, n
         self%first(part(l) + 1) = self%first(part(l) + 1) + 1
@@ -355,7 +316,7 @@ contains
           do l = 1, n
             moved(l) = self%cell(d, order(l))
           end do
-          self%cell(d, 1:n) = moved(1:n)
+          self%cell(d, 1:n) = moved
         end do
       end associate
     end associate
@@ -365,34 +326,33 @@ contains
   subroutine sum_by_part(grid, self)
     type(grid_t), intent(in) :: grid
     type(narrow_band_t), intent(inout) :: self
+    integer(i8) :: accumulator(accumulator_size, 2*self%parts)
     integer :: c, l, n, d, s, f(3)
     logical :: at_side
 
     n = self%parts
-    self%vents(1:n) = 0_i8
-    associate (accumulator => self%finder%accumulator)
-      do c = 1, n
-        associate (a => self%first(c), b => self%first(c + 1) - 1)
-          do l = a, b
-            at_side = .false.   ! can it exchange through an open side of the domain?
-            do d = 1, 3
-              do s = 0, 1
-                f = self%cell(:, l) + s*unit_step(:, d)
-                if (grid%side_of_face(f(d), d) == no_side) cycle
-                at_side = at_side .or. self%k(f(1), f(2), f(3), d) > 0.0_wp
-              end do
+    self%vents = spread(0_i8, 1, n)
+    self%total = spread(0.0_wp, 1, 2*n)
+    accumulator = spread(no_terms, 2, 2*n)
+    do c = 1, n
+      associate (a => self%first(c), b => self%first(c + 1) - 1)
+        do l = a, b
+          at_side = .false.   ! can it exchange through an open side of the domain?
+          do d = 1, 3
+            do s = 0, 1
+              f = self%cell(:, l) + s*unit_step(:, d)
+              if (grid%side_of_face(f(d), d) == no_side) cycle
+              at_side = at_side .or. self%k(f(1), f(2), f(3), d) > 0.0_wp
             end do
-            if (at_side) self%vents(c) = self%vents(c) + 1_i8
           end do
-          accumulator(:, c) = no_terms
-          accumulator(:, n + c) = no_terms
-          call exact_add(self%r(a:b), accumulator(:, c))
-          call exact_add(self%open(a:b), accumulator(:, n + c))
-        end associate
-      end do
-      call global_sum(self%vents(1:n))
-      call exact_totals(accumulator(:, 1:2*n), self%total(1:2*n))
-    end associate
+          if (at_side) self%vents(c) = self%vents(c) + 1_i8
+        end do
+        call exact_add(self%r(a:b), accumulator(:, c))
+        call exact_add(self%open(a:b), accumulator(:, n + c))
+      end associate
+    end do
+    call global_sum(self%vents)
+    call exact_totals(accumulator, self%total)
   end subroutine sum_by_part
 
   !> Take a part out of the system: its faces conduct nothing.

@@ -19,8 +19,9 @@ module open_flux_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: is_wall, gives_pressure
   use solid_geometry_m, only: solid_geometry_t
-  use narrow_band_m, only: narrow_band_t, reserve, reserve_for_all, &
-                         find_parts, sum_by_part, drop_part, find_open_lines
+  use narrow_band_m, only: narrow_band_t, reserve_for_all, find_parts, sum_by_part, drop_part, &
+                           find_open_lines
+  use growing_m, only: ensure_capacity
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
   use elliptic_solver_m, only: elliptic_solver_t
@@ -279,7 +280,8 @@ contains
       end do
     end do
     call list_marked(grid, lbound(band%number), band%number, band%cell, band%n)
-    call reserve(band)
+    call ensure_capacity(band%n, band%r)
+    call ensure_capacity(band%n, band%open)
   end subroutine list_band
 
   !> Volume balance r of the cells of the band.
@@ -352,24 +354,25 @@ contains
   subroutine balance_parts(self, balanced)
     type(open_flux_t), intent(inout) :: self
     logical, intent(out) :: balanced
-    integer :: c, l
+    real(wp) :: largest(self%band%parts)   ! rest |r| in each part [V]
     real(wp) :: share
+    integer :: c, l
 
+    largest = 0.0_wp
     associate (band => self%band)
       do c = 1, band%parts
         share = share_of_part(band, c)
         self%unmatched = max(self%unmatched, abs(share))
-        band%largest(c) = 0.0_wp
         do l = band%first(c), band%first(c + 1) - 1
           band%r(l) = band%r(l) - share*band%open(l)
-          band%largest(c) = max(band%largest(c), abs(band%r(l)))
+          largest(c) = max(largest(c), abs(band%r(l)))
         end do
       end do
-      call global_max(band%largest(1:band%parts))
-      balanced = all(band%largest(1:band%parts) <= self%control%tolerance)
+      call global_max(largest)
+      balanced = all(largest <= self%control%tolerance)
       if (balanced) return
       do c = 1, band%parts
-        if (band%largest(c) <= self%control%tolerance) call drop_part(c, band)
+        if (largest(c) <= self%control%tolerance) call drop_part(c, band)
       end do
     end associate
   end subroutine balance_parts

@@ -33,13 +33,10 @@ module small_cells_m
     integer :: n_implicit = 0
     integer, allocatable :: face(:, :)        !! (4, *) cell and direction of the lower face
     integer, allocatable :: donor(:, :), receiver(:, :)   !! (3, *)
-    integer, allocatable :: implicit_in_row(:, :)   !! work: of a direction in the row (:, j, k)
     real(wp), allocatable :: q_implicit(:), g_implicit(:)
       !! (*) volume and liquid through these faces, positive along the axis [m3]
     integer :: iterations = 0                 !! of the last donor values
     logical :: converged = .true.             !! all donor values of the step
-    ! Work of the donor values, a number for each small cell.
-    real(wp), allocatable :: amount(:), mass(:), ratio(:)
   end type small_cells_t
 
 contains
@@ -54,7 +51,6 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (self%implicit_in_row(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1))
     allocate (self%cell(3, first_size))
     allocate (self%face(4, first_size), self%donor(3, first_size), self%receiver(3, first_size))
   end subroutine small_cells_init
@@ -84,9 +80,6 @@ contains
       end do
     end do
     call list_marked(grid, lbound(self%number), self%number, self%cell, self%n)
-    call ensure_capacity(self%n, self%amount)
-    call ensure_capacity(self%n, self%mass)
-    call ensure_capacity(self%n, self%ratio)
     call halo_exchange(self%number, n_halo, layers=1)
     call find_implicit_faces(grid, volumes, self)
   end subroutine find_small_cells
@@ -96,6 +89,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
+    integer :: in_row(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1)   ! of a direction
     integer :: d, i, j, k, m, n, e(3), up(3), low(3), donor(3)
 
     m = 0
@@ -112,13 +106,13 @@ contains
                 (q(i, j, k, d) > 0.0_wp .and. number(i - e(1), j - e(2), k - e(3)) > 0) &
                 .or. (q(i, j, k, d) < 0.0_wp .and. number(i, j, k) > 0))
             end do
-            self%implicit_in_row(j, k) = n
+            in_row(j, k) = n
           end do
         end do
       end associate
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
-          if (self%implicit_in_row(j, k) == 0) cycle
+          if (in_row(j, k) == 0) cycle
           do i = grid%lo(1), grid%hi(1) + e(1)
             if (.not. abs(volumes%q(i, j, k, d)) > 0.0_wp) cycle
             up = [i, j, k]
@@ -208,9 +202,11 @@ contains
     type(small_cells_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: value(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of small cells
+    real(wp), dimension(self%n) :: held, of_cell   ! what each small cell holds, its mass
     integer(i8) :: faces(1)
     integer :: it, l, s, at(3)
     real(wp) :: change(2)   ! largest change and largest value of a pass
+    real(wp) :: ratio
 
     self%iterations = 0
     faces = int(self%n_implicit, i8)
@@ -219,36 +215,34 @@ contains
     ! What they hold after the sweeps, and their mass with all that comes in.
     do s = 1, self%n
       at = self%cell(:, s)
-      self%mass(s) = mass(at(1), at(2), at(3))
+      of_cell(s) = mass(at(1), at(2), at(3))
       value(at(1), at(2), at(3)) = 0.0_wp
-      if (self%mass(s) > 0.0_wp) then
-        value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
-      end if
+      if (of_cell(s) > 0.0_wp) value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/of_cell(s)
     end do
     do l = 1, self%n_implicit
       s = number_of(self%receiver(:, l))
-      if (s > 0) self%mass(s) = self%mass(s) + weight(l)
+      if (s > 0) of_cell(s) = of_cell(s) + weight(l)
     end do
     do it = 1, max_implicit_iterations
       call halo_exchange(value, n_halo, layers=1)
       do s = 1, self%n   ! one pass over the cells, and how much it changes
         at = self%cell(:, s)
-        self%amount(s) = amount(at(1), at(2), at(3))
+        held(s) = amount(at(1), at(2), at(3))
       end do
       do l = 1, self%n_implicit
         s = number_of(self%receiver(:, l))
         if (s == 0) cycle
         at = self%donor(:, l)
-        self%amount(s) = self%amount(s) + weight(l)*value(at(1), at(2), at(3))
+        held(s) = held(s) + weight(l)*value(at(1), at(2), at(3))
       end do
       change = 0.0_wp
       do s = 1, self%n
         at = self%cell(:, s)
-        self%ratio(s) = 0.0_wp
-        if (self%mass(s) > 0.0_wp) self%ratio(s) = self%amount(s)/self%mass(s)
-        change(1) = max(change(1), abs(self%ratio(s) - value(at(1), at(2), at(3))))
-        change(2) = max(change(2), abs(self%ratio(s)))
-        value(at(1), at(2), at(3)) = self%ratio(s)
+        ratio = 0.0_wp
+        if (of_cell(s) > 0.0_wp) ratio = held(s)/of_cell(s)
+        change(1) = max(change(1), abs(ratio - value(at(1), at(2), at(3))))
+        change(2) = max(change(2), abs(ratio))
+        value(at(1), at(2), at(3)) = ratio
       end do
       call global_max(change)
       self%iterations = it

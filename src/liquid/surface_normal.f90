@@ -13,7 +13,7 @@ module surface_normal_m
   !> Which way is up: rows of cells with equal height lie normal to it.
   type :: vertical_t
     integer :: axis = 0                  !! main axis of gravity, 0: there is none
-    real(wp) :: up(3) = [0.0_wp, 0.0_wp, 1.0_wp]   !! unit vector along it, against gravity
+    real(wp) :: up(3) = 0.0_wp           !! unit vector along it, against gravity; else along z
   end type vertical_t
 
   !> The 26 neighbours, those across a face first, then edges, then corners.
@@ -30,10 +30,9 @@ contains
     real(wp), intent(in) :: gravity(3)
     type(vertical_t) :: vertical
 
-    if (.not. any(abs(gravity) > 0.0_wp)) return
-    vertical%axis = maxloc(abs(gravity), 1)
-    vertical%up = 0.0_wp
-    vertical%up(vertical%axis) = -sign(1.0_wp, gravity(vertical%axis))
+    if (any(abs(gravity) > 0.0_wp)) vertical%axis = maxloc(abs(gravity), 1)
+    if (vertical%axis == 0) vertical%up(3) = 1.0_wp
+    if (vertical%axis > 0) vertical%up(vertical%axis) = -sign(1.0_wp, gravity(vertical%axis))
   end function vertical_of
 
   !> Can one look through a face of this open share?

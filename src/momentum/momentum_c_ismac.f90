@@ -61,7 +61,6 @@ module momentum_c_ismac_m
     integer :: n = 0                               !! bodies
     logical, allocatable :: free(:)
     type(wall_links_t), pointer :: walls => null()
-    real(wp), allocatable :: work(:, :)            !! (at least the links of a body, 6)
     real(wp), allocatable :: mobility(:, :, :)     !! (6, 6, n) motion per impulse rate, 0: held
   contains
     procedure :: apply => apply_predictor
@@ -74,9 +73,7 @@ module momentum_c_ismac_m
     !> Gravity less pressure gradient over density at u^n, and with the density at u* [m/s2].
     real(wp), allocatable :: a_old(:, :, :, :), a_new(:, :, :, :)
     real(wp), allocatable :: gain(:, :, :, :)      !! -sum_f q_f (u~_f - u_c) of u^n [m4/s]
-    real(wp), allocatable :: face(:, :, :)         !! u~ on the lower faces of one direction [m/s]
     type(predictor_operator_t) :: operator
-    type(identity_t) :: identity
     type(krylov_work_t) :: work
     real(wp), allocatable :: rhs(:, :, :), delta(:, :, :)   !! components one above the other
   end type c_ismac_t
@@ -97,7 +94,6 @@ contains
     b = grid%last
     allocate (self%q(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%u_old, self%a_old, self%a_new, self%gain, source=self%q)
-    allocate (self%face(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     associate (op => self%operator)
       op%lo = grid%lo
       op%hi = grid%hi
@@ -108,7 +104,6 @@ contains
       allocate (op%high, op%inverse, op%x, op%y, source=op%low)
       allocate (op%free(n), source=.false.)
       allocate (op%mobility(6, 6, n), source=0.0_wp)
-      allocate (op%work(0, 6))
     end associate
     call stacked%own(grid%lo, [grid%hi(1:2), grid%lo(3) + 3*(grid%hi(3) - grid%lo(3) + 1) - 1])
     call krylov_init(stacked, self%work)
@@ -121,22 +116,26 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! u^n, halo filled [m/s]
     type(c_ismac_t), intent(inout) :: self
+    real(wp), allocatable :: face(:, :, :)   ! u~ on the lower faces of one direction [m/s]
     integer :: i, j, k, m, d, e(3)
 
+    associate (a => grid%first, b => grid%last)
+      allocate (face(a(1):b(1), a(2):b(2), a(3):b(3)))
+    end associate
     self%u_old = u
     self%gain = 0.0_wp
     do m = 1, 3
       do d = 1, 3
         e = unit_step(:, d)
-        call face_values(grid, self%scheme, e, self%q(:, :, :, d), u(:, :, :, m), self%face)
+        call face_values(grid, self%scheme, e, self%q(:, :, :, d), u(:, :, :, m), face)
         !$omp parallel do private(i, j) schedule(static)
         do k = grid%lo(3), grid%hi(3)
           do j = grid%lo(2), grid%hi(2)
             do i = grid%lo(1), grid%hi(1)
               self%gain(i, j, k, m) = self%gain(i, j, k, m) &
-                + self%q(i, j, k, d)*(self%face(i, j, k) - u(i, j, k, m)) &
+                + self%q(i, j, k, d)*(face(i, j, k) - u(i, j, k, m)) &
                 - self%q(i + e(1), j + e(2), k + e(3), d) &
-                  *(self%face(i + e(1), j + e(2), k + e(3)) - u(i, j, k, m))
+                  *(face(i + e(1), j + e(2), k + e(3)) - u(i, j, k, m))
             end do
           end do
         end do
@@ -160,6 +159,7 @@ contains
     real(wp), dimension(6, bodies%n) :: none, pull, motion
     type(solve_control_t) :: control
     type(solve_report_t) :: report
+    type(identity_t) :: identity
     real(wp) :: scale
     integer :: m, b
 
@@ -179,7 +179,7 @@ contains
     self%delta = 0.0_wp
     control%tolerance = tolerance*scale
     control%max_iterations = max_iterations
-    call bicgstab(self%operator, self%identity, self%rhs, self%delta, control, report, self%work)
+    call bicgstab(self%operator, identity, self%rhs, self%delta, control, report, self%work)
     viscous%iterations = report%iterations
     viscous%converged = report%info == solved
     call unpack_components(self%delta, self%operator)
@@ -241,10 +241,6 @@ contains
     end associate
     ! Wall links, and the motion that an impulse rate gives each free body when the links hold it.
     associate (op => self%operator, walls => viscous%walls)
-      if (size(op%work, 1) < walls%n) then
-        deallocate (op%work)
-        allocate (op%work(2*walls%n, 6))
-      end if
       op%walls => viscous%walls
       op%free = bodies%free
       do i = 1, bodies%n
@@ -356,19 +352,19 @@ contains
     type(predictor_operator_t), intent(inout) :: op
     integer, intent(in) :: b
     real(wp) :: pull(6)
+    real(wp) :: terms(op%walls%first(b + 1) - op%walls%first(b), 6)   ! of its links
     integer(i8) :: accumulator(accumulator_size, 6)
-    integer :: l, n
+    integer :: l
 
-    n = op%walls%first(b + 1) - op%walls%first(b)
-    do l = 1, n
+    do l = 1, size(terms, 1)
       associate (m => op%walls%first(b) + l - 1)
         associate (c => op%walls%cell(:, m))
-          op%work(l, :) = wrench(op%walls%k(m)*op%x(c(1), c(2), c(3), :), op%walls%arm(:, m))
+          terms(l, :) = wrench(op%walls%k(m)*op%x(c(1), c(2), c(3), :), op%walls%arm(:, m))
         end associate
       end associate
     end do
     accumulator = spread(no_terms, 2, 6)
-    call exact_add_columns(op%work(1:n, :), accumulator)
+    call exact_add_columns(terms, accumulator)
     call exact_totals(accumulator, pull)
   end function pull_of_walls
 

@@ -33,8 +33,6 @@ module momentum_conservative_m
     !> Momentum through the lower faces of two planes, work of each thread [kg m/s].
     real(wp), allocatable :: carried(:, :, :, :, :)   !! (i, j, component, parity of k, thread)
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
-    real(wp), allocatable :: implicit_flux(:), implicit_mass(:)
-      !! momentum and mass through the faces of small cells
   end type momentum_t
 
 contains
@@ -55,7 +53,6 @@ contains
     end if
     allocate (self%carried(grid%lo(1):grid%hi(1) + 1, grid%lo(2):grid%hi(2) + 1, 3, 0:1, &
                            0:omp_get_max_threads() - 1), source=0.0_wp)
-    allocate (self%implicit_flux(0), self%implicit_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
 
@@ -220,6 +217,7 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on return [m/s]
     type(momentum_t), intent(inout) :: self
+    real(wp), dimension(transport%small%n_implicit) :: crossing, flux   ! mass, momentum: of a face
     integer :: m, l, k, at(3)
 
     ! the sweeps have done with their arrays
@@ -231,19 +229,14 @@ contains
                                      transport%volumes%w(:, :, k))
       end do
       call small_cells(grid, transport)
-      if (size(self%implicit_flux) < n) then
-        deallocate (self%implicit_flux, self%implicit_mass)
-        allocate (self%implicit_flux(2*n), self%implicit_mass(2*n))
-      end if
-      self%implicit_mass(1:n) = mass_through(fluid, small%q_implicit(1:n), small%g_implicit(1:n))
+      crossing = mass_through(fluid, small%q_implicit(1:n), small%g_implicit(1:n))
       do m = 1, 3
-        call implicit_values(grid, self%momentum(:, :, :, m), mass, abs(self%implicit_mass(1:n)), &
-                         small, value)
+        call implicit_values(grid, self%momentum(:, :, :, m), mass, abs(crossing), small, value)
         do l = 1, n
           at = small%donor(:, l)
-          self%implicit_flux(l) = self%implicit_mass(l)*value(at(1), at(2), at(3))
+          flux(l) = crossing(l)*value(at(1), at(2), at(3))
         end do
-        call move_implicit(grid, small, self%implicit_flux(1:n), self%momentum(:, :, :, m))
+        call move_implicit(grid, small, flux, self%momentum(:, :, :, m))
       end do
     end associate
     call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &

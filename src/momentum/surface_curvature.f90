@@ -25,10 +25,7 @@ module surface_curvature_m
     integer, allocatable :: state(:, :, :)       !! of the curvature, see above
     !> Place of the surface along each direction from the centre of a cell at it [cells].
     real(wp), allocatable :: place(:, :, :, :)
-    integer :: n_wanted = 0                      !! cells of this process without heights
-    integer, allocatable :: cell(:, :)           !! (3, *) those cells
-    real(wp), allocatable :: value(:)            !! (*) their curvature
-    integer :: fallback = 0                      !! such cells of all processes
+    integer :: fallback = 0                      !! cells of all processes without heights
   end type surface_curvature_t
 
 contains
@@ -40,6 +37,7 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! C^, halo filled [-]
     type(surface_curvature_t), intent(inout) :: self
+    integer, allocatable :: cell(:, :)   ! (3, *) own cells without heights
     integer(i8) :: cells(1)
     integer :: i, j, k, n
     logical :: found
@@ -63,20 +61,19 @@ contains
     call halo_exchange(self%state, n_halo)
     ! List the own cells that have no curvature from heights.
     n = 0
+    call ensure_capacity(1, cell)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (self%state(i, j, k) /= wanted) cycle
           n = n + 1
-          call ensure_capacity(n, self%cell)
-          self%cell(:, n) = [i, j, k]
+          call ensure_capacity(n, cell)
+          cell(:, n) = [i, j, k]
         end do
       end do
     end do
-    self%n_wanted = n
-    call ensure_capacity(n, self%value)
-    call curvature_from_others(grid, c, self)
-    cells = int(self%n_wanted, i8)
+    call curvature_from_others(grid, c, cell(:, :n), self)
+    cells = int(n, i8)
     call global_sum(cells)
     self%fallback = int(cells(1))
   end subroutine find_curvature
@@ -166,34 +163,36 @@ contains
   end function normal_at
 
   !> Mean of the neighbours that have heights, or the divergence of the normals.
-  subroutine curvature_from_others(grid, c, self)
+  subroutine curvature_from_others(grid, c, cell, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: cell(:, :)   !! (3, *) that have none
     type(surface_curvature_t), intent(inout) :: self
+    real(wp) :: value(size(cell, 2))    ! their curvature
     integer :: l, n, d
     real(wp) :: above(3), below(3)
 
-    do l = 1, self%n_wanted
-      associate (a => self%cell(:, l) - 1, b => self%cell(:, l) + 1)
+    do l = 1, size(cell, 2)
+      associate (a => cell(:, l) - 1, b => cell(:, l) + 1)
         n = count(self%state(a(1):b(1), a(2):b(2), a(3):b(3)) == from_heights)
         if (n > 0) then
-          self%value(l) = sum(self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), &
+          value(l) = sum(self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), &
             self%state(a(1):b(1), a(2):b(2), a(3):b(3)) == from_heights)/real(n, wp)
         else
           ! Divergence of the normals of the neighbours [1/m]: rough, but never more than that of a
           ! drop of one cell.
-          self%value(l) = 0.0_wp
+          value(l) = 0.0_wp
           do d = 1, 3
-            above = normal_at(grid, c, self%cell(:, l) + unit_step(:, d))
-            below = normal_at(grid, c, self%cell(:, l) - unit_step(:, d))
-            self%value(l) = self%value(l) + (above(d) - below(d))/(2.0_wp*grid%h(d))
+            above = normal_at(grid, c, cell(:, l) + unit_step(:, d))
+            below = normal_at(grid, c, cell(:, l) - unit_step(:, d))
+            value(l) = value(l) + (above(d) - below(d))/(2.0_wp*grid%h(d))
           end do
         end if
       end associate
     end do
-    do l = 1, self%n_wanted
-      associate (at => self%cell(:, l))
-        self%curvature(at(1), at(2), at(3)) = self%value(l)
+    do l = 1, size(cell, 2)
+      associate (at => cell(:, l))
+        self%curvature(at(1), at(2), at(3)) = value(l)
         self%state(at(1), at(2), at(3)) = from_others
       end associate
     end do

@@ -41,13 +41,11 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(surface_tension_t), intent(out) :: self
-    integer, parameter :: first_size = 1024   !! of lists, which grow
 
     self%acts = .not. fluid%single_phase
     if (.not. self%acts .or. fluid%surface_tension <= 0.0_wp) return
-    associate (a => grid%first, b => grid%last, surface => self%surface)
-      allocate (surface%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
-      allocate (surface%cell(3, first_size), surface%value(first_size))
+    associate (a => grid%first, b => grid%last)
+      allocate (self%surface%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
     end associate
   end subroutine surface_tension_init
 

@@ -208,13 +208,14 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(inout) :: self
     real(wp), dimension(6, bodies%n) :: r_body, s_body, z_body, y_body
+    real(wp), allocatable :: z(:, :, :, :)   ! residual over the diagonal
     real(wp) :: rz, rz_before, alpha, beta, worst
 
-    if (.not. allocated(self%z)) allocate (self%z, source=self%y)
+    allocate (z, source=self%y)
     call new_direction(grid, 0.0_wp, u, self%s)
     call apply_viscous(grid, bodies, self, bodies%motion, y_body)
     r_body = momentum - y_body
-    call improve(grid, 1.0_wp, self%y, self%r, self%diagonal, self%z, worst)
+    call improve(grid, 1.0_wp, self%y, self%r, self%diagonal, z, worst)
     s_body = 0.0_wp
     rz = 0.0_wp
     do
@@ -222,15 +223,15 @@ contains
       self%converged = max(worst, maxval([0.0_wp, abs(z_body(1:3, :))])) <= bound
       if (self%converged .or. self%iterations >= max_iterations) exit
       rz_before = rz
-      rz = dot(self%r, self%z) + sum(r_body*z_body)
+      rz = dot(self%r, z) + sum(r_body*z_body)
       beta = 0.0_wp
       if (rz_before > 0.0_wp) beta = rz/rz_before
-      call new_direction(grid, beta, self%z, self%s)
+      call new_direction(grid, beta, z, self%s)
       s_body = z_body + beta*s_body
       call apply_viscous(grid, bodies, self, s_body, y_body)
       alpha = rz/(dot(self%s, self%y) + sum(s_body*y_body))
       call improve(grid, -alpha, self%s, u)
-      call improve(grid, alpha, self%y, self%r, self%diagonal, self%z, worst)
+      call improve(grid, alpha, self%y, self%r, self%diagonal, z, worst)
       bodies%motion = bodies%motion + alpha*s_body
       r_body = r_body - alpha*y_body
       self%iterations = self%iterations + 1

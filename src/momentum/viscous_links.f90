@@ -68,7 +68,6 @@ contains
       call links_to_sides(grid, solid, mu, d, self)
     end do
     call links_to_bodies(grid, solid, bodies, rho, mu, self, merged)
-    call group_by_body(bodies%n, self)
     call bodies_seen_by_links(solid, bodies, mu, grid, self)
     call finish_diagonal(grid, self%link, self%mass, self%diagonal, self%spread)
   end subroutine build_viscous
@@ -176,7 +175,8 @@ contains
     end do
   end subroutine ordinary_links
 
-  !> Wall links, of one or both cells of each face through which a link meets a surface.
+  !> Wall links, of one or both cells of each face through which a link meets a surface, grouped by
+  !! body.
   subroutine links_to_bodies(grid, solid, bodies, rho, mu, self, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -185,23 +185,17 @@ contains
       contiguous :: rho, mu
     type(viscous_t), intent(inout) :: self
     type(merged_cells_t), intent(in), optional :: merged
+    type(wall_links_t) :: found             ! as they are found
+    integer :: body_of(2*solid%n_link)      ! of each; 0: none
     real(wp) :: spacing
     integer :: m, f(3)
 
     spacing = cube_root(grid%volume)
-    self%walls%n = 2*solid%n_link
-    associate (n => self%walls%n, walls => self%walls)
-      call ensure_capacity(n, walls%found_cell)
-      call ensure_capacity(n, walls%found_body)
-      call ensure_capacity(n, walls%found_k)
-      call ensure_capacity(n, walls%found_arm)
-      call ensure_capacity(n, walls%cell)
-      call ensure_capacity(n, walls%k)
-      call ensure_capacity(n, walls%arm)
-    end associate
+    found%n = 2*solid%n_link
+    allocate (found%cell(3, found%n), found%k(found%n), found%arm(3, found%n))
     !$omp parallel do private(f) schedule(static)
     do m = 1, solid%n_link
-      self%walls%found_body(2*m - 1:2*m) = 0
+      body_of(2*m - 1:2*m) = 0
       f = solid%link(1:3, m)
       associate (d => solid%link(4, m), theta => solid%link_length(:, m), &
                  body => solid%link_body(:, m))
@@ -210,6 +204,7 @@ contains
         call wall_link(2*m, f, d, theta(2), -1, body(2))
       end associate
     end do
+    call group_by_body(bodies%n, found, body_of, self)
   contains
     !> Link n from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
     subroutine wall_link(n, c, d, theta, sense, body)
@@ -236,10 +231,10 @@ contains
             at_centre*merged%wall_speed(n), distance_of_links(grid, solid, c), spacing))
         end if
       end if
-      self%walls%found_cell(:, n) = c
-      self%walls%found_body(n) = body
-      self%walls%found_k(n) = viscosity*grid%area(d)/(grid%h(d)*t)
-      self%walls%found_arm(:, n) = nearest_arm(grid, x_wall, bodies%x(:, body))
+      found%cell(:, n) = c
+      body_of(n) = body
+      found%k(n) = viscosity*grid%area(d)/(grid%h(d)*t)
+      found%arm(:, n) = nearest_arm(grid, x_wall, bodies%x(:, body))
     end subroutine wall_link
   end subroutine links_to_bodies
 
@@ -283,40 +278,46 @@ contains
 
   !> Bring the wall links into the order of the bodies, keeping the order in which they were found,
   !! and into the diagonal.
-  subroutine group_by_body(n_bodies, self)
+  subroutine group_by_body(n_bodies, found, body_of, self)
     integer, intent(in) :: n_bodies
+    type(wall_links_t), intent(in) :: found
+    integer, intent(in) :: body_of(:)   !! each of them; 0: none
     type(viscous_t), intent(inout) :: self
     integer :: b, m, place
 
-    self%walls%first = 0
-    do m = 1, self%walls%n
-      b = self%walls%found_body(m)
-      if (b > 0) self%walls%first(b) = self%walls%first(b) + 1
-    end do
-    place = 1
-    do b = 1, n_bodies + 1
-      m = self%walls%first(b)
-      self%walls%first(b) = place
-      place = place + m
-    end do
-    do m = 1, self%walls%n
-      b = self%walls%found_body(m)
-      if (b == 0) cycle
-      associate (c => self%walls%found_cell(:, m))
-        self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) &
-                                             + self%walls%found_k(m)
-      end associate
-      place = self%walls%first(b)
-      self%walls%first(b) = place + 1
-      self%walls%cell(:, place) = self%walls%found_cell(:, m)
-      self%walls%k(place) = self%walls%found_k(m)
-      self%walls%arm(:, place) = self%walls%found_arm(:, m)
-    end do
-    do b = n_bodies + 1, 2, -1
-      self%walls%first(b) = self%walls%first(b - 1)
-    end do
-    self%walls%first(1) = 1
-    self%walls%n = self%walls%first(n_bodies + 1) - 1
+    associate (walls => self%walls)
+      call ensure_capacity(found%n, walls%cell)
+      call ensure_capacity(found%n, walls%k)
+      call ensure_capacity(found%n, walls%arm)
+      walls%first = 0
+      do m = 1, found%n
+        b = body_of(m)
+        if (b > 0) walls%first(b) = walls%first(b) + 1
+      end do
+      place = 1
+      do b = 1, n_bodies + 1
+        m = walls%first(b)
+        walls%first(b) = place
+        place = place + m
+      end do
+      do m = 1, found%n
+        b = body_of(m)
+        if (b == 0) cycle
+        associate (c => found%cell(:, m))
+          self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + found%k(m)
+        end associate
+        place = walls%first(b)
+        walls%first(b) = place + 1
+        walls%cell(:, place) = found%cell(:, m)
+        walls%k(place) = found%k(m)
+        walls%arm(:, place) = found%arm(:, m)
+      end do
+      do b = n_bodies + 1, 2, -1
+        walls%first(b) = walls%first(b - 1)
+      end do
+      walls%first(1) = 1
+      walls%n = walls%first(n_bodies + 1) - 1
+    end associate
   end subroutine group_by_body
 
   !> What the links do to a body that moves: its 6 x 6 block of the system, with mass and inertia

@@ -17,9 +17,6 @@ module viscous_system_m
     integer, allocatable :: cell(:, :)        !! (3, *)
     real(wp), allocatable :: k(:)             !! conductance [kg/s]
     real(wp), allocatable :: arm(:, :)        !! (3, *) from the centre of mass to the wall [m]
-    integer, allocatable :: found_body(:)     !! body of each link before grouping; 0: none
-    integer, allocatable :: found_cell(:, :)
-    real(wp), allocatable :: found_k(:), found_arm(:, :)
   end type wall_links_t
 
   !> Half links to sides of the domain that move.
@@ -47,7 +44,6 @@ module viscous_system_m
       !! 2 mu V of the body: torque per angular velocity [N m s]
     real(wp), allocatable :: r(:, :, :, :)   !! right side; of conjugate gradients the residual
     real(wp), allocatable :: s(:, :, :, :), y(:, :, :, :)   !! direction, the system applied to it
-    real(wp), allocatable :: z(:, :, :, :)   !! residual over the diagonal, if ever needed
     real(wp), allocatable :: force(:, :)   !! (6, n) of the fluid on each body [N, N m]
     integer :: iterations = 0              !! of the last solve
     logical :: converged = .true.
@@ -80,8 +76,6 @@ contains
     associate (walls => self%walls)
       allocate (walls%first(n_bodies + 1), source=1)
       allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0))
-      allocate (walls%found_body(0), walls%found_cell(3, 0), walls%found_k(0), &
-                walls%found_arm(3, 0))
     end associate
   end subroutine viscous_init
 

@@ -33,7 +33,6 @@ module pressure_m
     real(wp) :: tolerance = 0.0_wp         !! of the divergence [1/s]
     integer :: max_passes = 0
     real(wp), allocatable :: phi_total(:, :, :)                      !! full halo [Pa]
-    integer, allocatable :: known(:, :, :), closed(:, :)   !! work of `extend_pressure`
     type(pressure_report_t) :: report             !! of the last solve
   end type pressure_t
 
@@ -52,7 +51,6 @@ contains
     call pressure_system_init(grid, n_bodies, numerics, self%system)
     a = grid%first
     b = grid%last
-    allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%phi_total(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine pressure_init
 

@@ -29,43 +29,46 @@ contains
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(solid_geometry_t), intent(in) :: solid
     type(flow_t), intent(inout) :: flow      !! its pressure
-    type(pressure_t), intent(inout) :: self
+    type(pressure_t), intent(in) :: self
     real(wp), parameter :: full = 0.9_wp   ! solid share of a cell that does not lend its pressure
     real(wp), parameter :: film = 0.01_wp       ! aperture of all faces below which it is one
+    integer, allocatable :: known(:, :, :)   ! since which pass; -1: not yet, 0: it lends none
+    integer, allocatable :: cell(:, :)       ! (3, *) of those that take no part
     integer :: k, l, n, pass, round
     integer(i8) :: left(1)
 
+    associate (a => grid%first, b => grid%last)
+      allocate (known(a(1):b(1), a(2):b(2), a(3):b(3)))
+    end associate
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
-      self%known(:, :, k) = merge(0, 1, self%system%active(:, :, k))
+      known(:, :, k) = merge(0, 1, self%system%active(:, :, k))
     end do
     do l = 1, solid%n_cut
       associate (c => solid%cut_cell(:, l))
-        if (is_film(c)) self%known(c(1), c(2), c(3)) = 1
+        if (is_film(c)) known(c(1), c(2), c(3)) = 1
       end associate
     end do
-    call list_marked(grid, grid%first, self%known, self%closed, n)
-    associate (known => self%known, cell => self%closed)
-      !$omp parallel do schedule(static)
-      do k = grid%first(3), grid%last(3)
-        known(:, :, k) = merge(-1, merge(1, 0, solid%alpha(:, :, k) <= full), known(:, :, k) > 0)
-      end do
-      pass = 1
-      do round = 1, 3   ! sideways; from above and below; from cells that are nearly full
-        if (round == 3) where (known == 0) known = 1
-        do
-          call halo_exchange(flow%p, n_halo, layers=1)
-          call halo_exchange(known, n_halo, layers=1)
-          pass = pass + 1
-          left = 0_i8
-          do l = 1, n
-            if (known(cell(1, l), cell(2, l), cell(3, l)) < 0) call from_neighbours(cell(:, l))
-          end do
-          call global_sum(left)
-          if (left(1) == 0_i8) exit
+    call list_marked(grid, grid%first, known, cell, n)
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      known(:, :, k) = merge(-1, merge(1, 0, solid%alpha(:, :, k) <= full), known(:, :, k) > 0)
+    end do
+    pass = 1
+    do round = 1, 3   ! sideways; from above and below; from cells that are nearly full
+      if (round == 3) where (known == 0) known = 1
+      do
+        call halo_exchange(flow%p, n_halo, layers=1)
+        call halo_exchange(known, n_halo, layers=1)
+        pass = pass + 1
+        left = 0_i8
+        do l = 1, n
+          if (known(cell(1, l), cell(2, l), cell(3, l)) < 0) call from_neighbours(cell(:, l))
         end do
+        call global_sum(left)
+        if (left(1) == 0_i8) exit
       end do
-    end associate
+    end do
     call fill_scalar_halo(grid, flow%p, layers=1)
   contains
     !> Are all faces of cut cell c through which fluid can move narrow?
@@ -97,7 +100,7 @@ contains
         do s = -1, 1, 2
           o = c + s*unit_step(:, d)
           if (any((o < 1 .or. o > grid%n) .and. .not. grid%periodic)) cycle
-          if (any(self%known(o(1), o(2), o(3)) == [-1, 0, pass])) cycle
+          if (any(known(o(1), o(2), o(3)) == [-1, 0, pass])) cycle
           count = count + 1
           total = total + flow%p(o(1), o(2), o(3)) - real(s, wp)*gravity(d)*grid%h(d) &
                   *face_mean(flow%rho(o(1), o(2), o(3)), flow%rho(c(1), c(2), c(3)))
@@ -105,7 +108,7 @@ contains
       end do
       if (count == 0) return
       flow%p(c(1), c(2), c(3)) = total/real(count, wp)
-      self%known(c(1), c(2), c(3)) = pass
+      known(c(1), c(2), c(3)) = pass
       left = left + 1_i8
     end subroutine from_neighbours
   end subroutine extend_pressure

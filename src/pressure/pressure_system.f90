@@ -50,7 +50,6 @@ module pressure_system_m
     type(pressure_operator_t) :: operator
     type(elliptic_solver_t) :: solver   !! keeps nothing from one system to the next
     type(jacobi_t) :: jacobi
-    type(identity_t) :: identity
     logical, allocatable :: active(:, :, :)   !! the cell has an open face
     character(name_length) :: method = 'cg', preconditioner = 'multigrid'   !! by their names
   end type pressure_system_t
@@ -211,11 +210,12 @@ contains
     real(wp), intent(in) :: tolerance   !! of the residual [m3/s2]
     type(pressure_system_t), intent(inout) :: self
     integer, intent(out) :: iterations
+    type(identity_t) :: identity
 
     select case (trim(self%preconditioner))
     case ('multigrid'); call solve_with(self%solver%multigrid)
     case ('jacobi'); call solve_with(self%jacobi)
-    case default; call solve_with(self%identity)   ! 'none', as `require_names` has made sure
+    case default; call solve_with(identity)   ! 'none', as `require_names` has made sure
     end select
   contains
     subroutine solve_with(preconditioner)
