@@ -25,8 +25,7 @@ module allowed_values_m
   type :: entry_t
     character(name_length) :: name = ''
     character(8) :: kind = ''               !! 'number', 'text', 'name', 'logical' or 'choice'
-    real(wp), allocatable :: number(:)      !! values that are given or by default, of a number
-    character(:), allocatable :: text       !! of the other kinds, as a case would write it
+    character(:), allocatable :: text       !! its value as a case would write it; empty: none
     character(:), allocatable :: meaning
     character(:), allocatable :: example    !! assignments, that of this variable the last
     character(:), allocatable :: choices    !! words, one blank between them, if a choice
@@ -35,7 +34,7 @@ module allowed_values_m
     logical :: required = .false.
     logical :: idle = .false.               !! without meaning, because of what was chosen
   contains
-    procedure :: value => entry_value, with_unit
+    procedure :: with_unit
   end type entry_t
 
   type(allowed_t), parameter :: whole = allowed_t(whole=.true.)   !! any whole number
@@ -132,20 +131,6 @@ contains
       text = 'positive'
     end if
   end function allowed_words
-
-  !> The value as a case would write it; empty for none.
-  pure function entry_value(self) result(text)
-    class(entry_t), intent(in) :: self
-    character(:), allocatable :: text
-
-    if (self%kind /= 'number') then
-      text = self%text
-    else if (self%allowed%whole) then
-      text = to_text(nint(self%number))
-    else
-      text = to_text(self%number)
-    end if
-  end function entry_value
 
   !> The meaning, with the unit if there is one.
   pure function with_unit(self) result(text)

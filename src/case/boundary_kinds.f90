@@ -1,8 +1,8 @@
-!> The kinds of sides a tank can have, a row each: what it is called and what it asks of the flow.
+!> The kinds of sides a tank can have: what each is called and what it asks of the flow.
 !!
-!! A new kind is a row here, and its physics where a rule of its own begins.
+!! A new kind is one more entry of each list here, and its physics where a rule of its own begins.
 module boundary_kinds_m
-  use kinds_m, only: name_length
+  use allowed_values_m, only: words_of
   implicit none
   private
   public :: no_side, side_no_slip, side_slip, side_open, side_periodic, side_inflow, side_outflow
@@ -12,29 +12,18 @@ module boundary_kinds_m
   integer, parameter :: side_no_slip = 1, side_slip = 2, side_open = 3, side_periodic = 4
   integer, parameter :: side_inflow = 5, side_outflow = 6
 
-  type :: boundary_kind_t
-    character(name_length) :: name   !! in the case file
-    logical :: wall                  !! no fluid and no block passes
-    logical :: pressure              !! given half a cell beyond the last cell: the flow is free
-    logical :: velocity              !! given normal to the side: none of a wall, an inflow's own
-    logical :: drag                  !! along the side the fluid moves with it
-  end type boundary_kind_t
+  character(*), parameter :: side_names = 'no_slip slip open periodic inflow outflow'
 
-  type(boundary_kind_t), parameter :: kind_of(0:*) = [ &
-    !                            wall     pressure velocity drag
-    boundary_kind_t('',          .false., .false., .false., .false.), &
-    boundary_kind_t('no_slip',   .true.,  .false., .true.,  .true.), &
-    boundary_kind_t('slip',      .true.,  .false., .true.,  .false.), &
-    boundary_kind_t('open',      .false., .true.,  .false., .false.), &
-    boundary_kind_t('periodic',  .false., .false., .false., .false.), &
-    boundary_kind_t('inflow',    .false., .false., .true.,  .true.), &
-    boundary_kind_t('outflow',   .false., .true.,  .false., .false.)]
-
-  !> What a side of each code is; an array of codes makes one of answers.
-  logical, parameter :: is_wall(0:*) = kind_of%wall
-  logical, parameter :: gives_pressure(0:*) = kind_of%pressure
-  logical, parameter :: gives_velocity(0:*) = kind_of%velocity
-  logical, parameter :: drags(0:*) = kind_of%drag
+  logical, parameter :: t = .true., f = .false.
+  !> What a side of each code is, in the order above; an array of codes makes one of answers. No
+  !! fluid and no block passes a wall.
+  logical, parameter :: is_wall(0:*) = [f, t, t, f, f, f, f]
+  !> The pressure is given half a cell beyond the last cell: the flow is free.
+  logical, parameter :: gives_pressure(0:*) = [f, f, f, t, f, f, t]
+  !> The velocity normal to the side is given: none of a wall, an inflow's own.
+  logical, parameter :: gives_velocity(0:*) = [f, t, t, f, f, t, f]
+  !> Along the side the fluid moves with it.
+  logical, parameter :: drags(0:*) = [f, t, f, f, f, t, f]
 
 contains
 
@@ -43,18 +32,7 @@ contains
     character(*), intent(in) :: name
     integer :: code
 
-    code = max(no_side, findloc(kind_of%name == name, .true., 1) - 1)   ! the first is 0
+    code = findloc(words_of(side_names) == name, .true., 1)   ! `no_side` if there is none
   end function side_code
-
-  !> The names of all kinds, one blank between them.
-  pure function side_names() result(names)
-    character(:), allocatable :: names
-    integer :: code
-
-    names = trim(kind_of(1)%name)
-    do code = 2, ubound(kind_of, 1)
-      names = names//' '//trim(kind_of(code)%name)
-    end do
-  end function side_names
 
 end module boundary_kinds_m

@@ -404,7 +404,7 @@ contains
   !> Every parameter of a case after defaults, as the text of a case with the same meaning.
   function parameters_text(case) result(text)
     type(case_t), intent(in) :: case
-    character(:), allocatable :: text, value
+    character(:), allocatable :: text
     type(string_builder_t) :: lines
     type(case_t) :: copy   ! reading a group in which nothing is given leaves it as it is
     type(group_visitor_t) :: v
@@ -426,9 +426,8 @@ contains
         call visit_group(v, copy, group_names(g), i, no_names)
         call lines%add_line('&'//trim(group_names(g)))
         do k = 1, v%n
-          value = v%entry(k)%value()
-          if (v%entry(k)%idle .or. len(value) == 0) cycle
-          call lines%add_line('  '//trim(v%entry(k)%name)//' = '//value)
+          if (v%entry(k)%idle .or. len(v%entry(k)%text) == 0) cycle
+          call lines%add_line('  '//trim(v%entry(k)%name)//' = '//v%entry(k)%text)
         end do
         call lines%add_line('/')
       end do

@@ -20,6 +20,8 @@ module case_types_m
 
   integer, parameter :: max_variants = 5000   !! stones of a family
 
+  real(wp), parameter :: unturned(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]   !! a quaternion
+
   !> What the reader knows of a group.
   type :: group_t
     integer :: line = 0                             !! of the case file, where it begins
@@ -121,7 +123,7 @@ module case_types_m
     character(name_length) :: name = ''             !! of a unit of another run
     real(wp) :: position(3) = absent                !! required: centre of mass [m]
     !> w, x, y, z, normalised; axis and angle end up here as well.
-    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp) :: quaternion(4) = unturned
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
     logical :: fixed = .false.
@@ -138,7 +140,7 @@ module case_types_m
     character(name_length) :: name = ''             !! of the unit in a plan; '': none
     real(wp) :: x(3) = absent                       !! z absent: on what lies there [m]
     real(wp) :: planned(2) = absent                 !! x, y without the random shift [m]
-    real(wp) :: q(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp) :: q(4) = unturned
     real(wp) :: v(3) = 0.0_wp                       !! [m/s]
     real(wp) :: time = 0.0_wp                       !! [s]
     logical :: fixed = .false.
@@ -166,7 +168,7 @@ module case_types_m
     real(wp) :: first_time = 0.0_wp, interval = 1.0_wp   !! [s]
     real(wp) :: spread(3) = 0.0_wp                  !! [m]
     character(name_length) :: orientation = 'given' !! 'given' or 'random'
-    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp) :: quaternion(4) = unturned
     real(wp) :: tilt_deg = 0.0_wp
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1

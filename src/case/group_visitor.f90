@@ -276,7 +276,8 @@ contains
       if (len(problem) > 0) call self%fault(i, problem)
       if (self%good(variable)) x = values
     end if
-    self%entry(self%n)%number = pack(x, is_given(x))
+    self%entry(self%n)%text = to_text(pack(x, is_given(x)))
+    if (allowed%whole) self%entry(self%n)%text = to_text(nint(pack(x, is_given(x))))
   end subroutine real_values
 
   !> A logical; its example is what it is not by default.

@@ -67,8 +67,8 @@ contains
     indent = maxval(len_trim(v%entry(:v%n)%name)) + 4
     do i = 1, v%n
       associate (entry => v%entry(i))
-        default = 'default '//entry%value()
-        if (len(entry%value()) == 0) default = 'no default'
+        default = 'default '//entry%text
+        if (len(entry%text) == 0) default = 'no default'
         if (entry%required) default = 'required'
         call lines%add_line('')
         call lines%add_line('  '//entry%name(:indent - 2) &
@@ -167,8 +167,8 @@ contains
         if (entry%allowed%unit /= '') rules = rules//', "unit": "'//trim(entry%allowed%unit)//'"'
         if (entry%required) then
           needed = needed//' '//trim(entry%name)
-        else if (len(entry%value()) > 0) then
-          rules = rules//', "default": '//json(entry%value(), entry%most > 1)
+        else if (len(entry%text) > 0) then
+          rules = rules//', "default": '//json(entry%text, entry%most > 1)
         end if
         rules = rules//', "examples": ['//json(entry%example(index(entry%example, ' = ', &
           back=.true.) + 3:), entry%most > 1)//']}'

@@ -112,7 +112,7 @@ contains
     do d = 1, 3
       do s = 1, 2
         call v%option(side_name(s, d), boundary%kind(s, d), &
-          side_names(), trim(side_meaning(s, d))//': a wall to ' &
+          side_names, trim(side_meaning(s, d))//': a wall to ' &
           //'which the fluid sticks or along which it slips, open (pressure 0), periodic (with ' &
           //'the side across), or where a stream enters or leaves', example='''slip''')
       end do

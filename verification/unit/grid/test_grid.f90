@@ -33,7 +33,7 @@ contains
       'periodic', 'inflow', 'outflow']) == kinds))
     call check('unknown name', side_code('window') == no_side)
     call check('no name', side_code('') == no_side)
-    call check('names', side_names() == 'no_slip slip open periodic inflow outflow')
+    call check('names', side_names == 'no_slip slip open periodic inflow outflow')
     call check('walls', all(is_wall(kinds) .eqv. kinds <= side_slip))
     call check('pressure given', all(gives_pressure(kinds) .eqv. &
                                      (kinds == side_open .or. kinds == side_outflow)))
