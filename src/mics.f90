@@ -71,12 +71,12 @@ program mics
   call measure(sim, report)
   ! of a run that goes on, what was due has been written
   if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
-  stop_requests = stop_requests_t('', output%lock, options%max_wall, began, last=wall_clock())
+  stop_requests = stop_requests_t('', options%max_wall, began, last=wall_clock())
   call store_places(sim, fault)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
     call find_fault(sim, report, fault)
-    signal = stop_asked(stop_requests)
+    signal = stop_asked(output%lock, stop_requests)
     if (sim%clock%finished()) signal = 0   ! there is nothing left to stop
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)

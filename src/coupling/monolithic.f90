@@ -13,7 +13,7 @@ module monolithic_m
   use stage_m, only: stage_t
   use fields_m, only: add_product
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
+  use rigid_motion_m, only: rigid_motion_t, set_inertia
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, velocity_in_cell
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
@@ -49,7 +49,6 @@ module monolithic_m
     !! tolerance of the first of two pressure solves over that of the second
 
   type, extends(coupling_t) :: monolithic_t
-    type(rigid_motion_t) :: predicted               !! the motion at the end, by `extrapolated`
     real(wp), allocatable :: extrapolated(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(merged_cells_t), allocatable :: merged_before, merged
@@ -91,7 +90,6 @@ contains
     call coupling_init(grid, n, case, self)
     a = grid%first
     b = grid%last
-    call rigid_motion_init(n, self%predicted)
     allocate (self%merged_before, self%merged)
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
@@ -274,9 +272,10 @@ contains
   subroutine predict_faces(self, s)
     class(monolithic_t), intent(inout) :: self
     type(stage_t), intent(in) :: s
+    type(rigid_motion_t) :: predicted   ! at the end, by `extrapolated`
 
-    self%predicted%x = self%bodies%x
-    self%predicted%motion = self%at_start%motion + self%extrapolated
+    predicted%x = self%bodies%x
+    predicted%motion = self%at_start%motion + self%extrapolated
     associate (grid => s%grid, dt => s%dt, flow => s%flow, a => self%acceleration, &
                merged => self%merged)
       call fill_velocity_halo(grid, flow%u, layers=1)
@@ -288,7 +287,7 @@ contains
         call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction)
         call shorten_at_walls(grid, dt, self%bodies, merged, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, s%solid, self%at_start, self%predicted, merged, dt, &
+      call face_velocity_at_walls(grid, s%solid, self%at_start, predicted, merged, dt, &
                                   self%implicit_momentum, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(s, self)

@@ -17,7 +17,6 @@ module stop_requests_m
 
   type :: stop_requests_t
     character(:), allocatable :: reason      !! why the run ends, on the root process
-    type(folder_lock_t) :: folder            !! of the results, on the root process
     real(wp) :: max_wall = 0.0_wp            !! time given [s], 0: no end
     real(wp) :: began = 0.0_wp               !! when the time given began
     real(wp) :: last = 0.0_wp                !! when the last step ended
@@ -29,7 +28,8 @@ contains
 
   !> After a step: the signal that ends the run, 0 for none. A file or the time count as SIGTERM.
   !! All processes call and get the same answer.
-  function stop_asked(self) result(number)
+  function stop_asked(folder, self) result(number)
+    type(folder_lock_t), intent(inout) :: folder   !! of the results, on the root process
     type(stop_requests_t), intent(inout) :: self
     integer :: number
     real(wp) :: of_any(1), now, kept
@@ -45,10 +45,9 @@ contains
       end if
       if (now >= self%next_look) then
         self%next_look = now + look_interval
-        if (self%folder%has(stop_name)) then   ! it has served and goes
-          call self%folder%remove(stop_name)
-          self%reason = "stopped by the file '"//self%folder%folder//'/'//stop_name &
-            //"', now removed"
+        if (folder%has(stop_name)) then   ! it has served and goes
+          call folder%remove(stop_name)
+          self%reason = "stopped by the file '"//folder%folder//'/'//stop_name//"', now removed"
         end if
       end if
       if (len(self%reason) > 0) of_any = real(signal_terminate, wp)
