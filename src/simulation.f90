@@ -6,7 +6,7 @@ module simulation_m
   use scratch_m, only: scratch_t, scratch_init
   use fields_m, only: flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use solid_fraction_m, only: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use liquid_fill_m, only: fill_liquid
   use initial_state_m, only: read_initial_state
   use extended_fraction_m, only: extend_fraction
@@ -63,7 +63,7 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in), target :: bed   !! which stays where it is
     type(simulation_t), intent(inout), target :: sim
-    integer :: d, n_solids
+    integer :: d, n_solids, subcells   ! the latter 0: exact solid shares
 
     sim%case = case
     select case (case%run%physics)
@@ -91,12 +91,17 @@ contains
     call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
     if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
       sim%grid%h, sim%blocks, sim%contacts%lubrication)
+    select case (case%numerics%solid_fraction)
+    case ('exact'); subcells = 0
+    case ('subcell'); subcells = case%numerics%subcells
+    case default; error stop 'simulation_init: no such solid_fraction'
+    end select
     call flow_init(sim%grid, sim%flow)
     n_solids = sim%blocks%n
     if (bed%there) n_solids = n_solids + 1
     call solid_geometry_init(sim%grid, sim%solid, n_solids)
     call solid_geometry_init(sim%grid, sim%before, n_solids)
-    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, subcells_of(case%numerics), bed)
+    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, subcells, bed)
     call scratch_init(sim%grid, sim%scratch)
     call fluid_transport_init(case, sim%grid, sim%transport)
     call choose_coupling(case, n_solids, sim)

@@ -7,7 +7,6 @@
 module solid_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
-  use case_types_m, only: numerics_t
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use tet_mesh_m, only: shape_t
@@ -26,7 +25,7 @@ module solid_fraction_m
   use pockets_m, only: close_pockets
   implicit none
   private
-  public :: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
+  public :: solid_fraction_t, solid_fraction_init, update_solid
 
   type :: solid_fraction_t
     type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body, and of the bed
@@ -42,18 +41,6 @@ module solid_fraction_m
   end type solid_fraction_t
 
 contains
-
-  !> Sub-cells per direction in which solid shares are counted, 0: exact shares.
-  function subcells_of(numerics) result(subcells)
-    type(numerics_t), intent(in) :: numerics
-    integer :: subcells
-
-    select case (numerics%solid_fraction)
-    case ('exact'); subcells = 0
-    case ('subcell'); subcells = numerics%subcells
-    case default; error stop 'subcells_of: no such solid_fraction'
-    end select
-  end function subcells_of
 
   !> Allocate the caches and work arrays.
   subroutine solid_fraction_init(grid, blocks, self, subcells, bed)

@@ -34,21 +34,15 @@ module rigid_flux_m
     integer, allocatable :: cell(:, :)
       !! (3, *) own cells with open faces that a body pushes on
     real(wp), allocatable :: j(:, :)         !! (*, 6) net unit fluxes out of the cell [m2, m3]
-    integer, allocatable :: slot(:, :, :)    !! entry of a cell while the lists are built
   end type rigid_flux_t
 
 contains
 
-  !> Allocate for `n` bodies on a grid.
-  subroutine rigid_flux_init(grid, n, self)
-    type(grid_t), intent(in) :: grid
+  !> Allocate for `n` bodies.
+  subroutine rigid_flux_init(n, self)
     integer, intent(in) :: n
     type(rigid_flux_t), intent(out) :: self
-    integer :: a(3), b(3)
 
-    a = grid%first
-    b = grid%last
-    allocate (self%slot(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%first(n + 1), source=1)
     allocate (self%first_face(n + 1), self%held_from(n), source=1)
     allocate (self%face(4, 0), self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(0, 6))
@@ -94,6 +88,7 @@ contains
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
       !! cell has an open face
     type(rigid_flux_t), intent(inout) :: self
+    integer, allocatable :: slot(:, :, :)   ! entry of a cell for the body at hand
     integer :: b, m, n_face, n_entry, entry_of_body, high(3)
     real(wp) :: s(6)
 
@@ -120,6 +115,9 @@ contains
       !$omp end do nowait
     end do
     !$omp end parallel
+    associate (a => grid%lo, z => grid%hi)
+      allocate (slot(a(1):z(1), a(2):z(2), a(3):z(3)), source=0)
+    end associate
     n_entry = 0
     do b = 1, bodies%n
       self%first(b) = n_entry + 1
@@ -133,7 +131,7 @@ contains
       end do
       do entry_of_body = self%first(b), n_entry
         associate (c => self%cell(:, entry_of_body))
-          self%slot(c(1), c(2), c(3)) = 0
+          slot(c(1), c(2), c(3)) = 0
         end associate
       end do
     end do
@@ -162,11 +160,11 @@ contains
 
       if (.not. grid%owns(c)) return
       if (.not. active(c(1), c(2), c(3))) return
-      e = self%slot(c(1), c(2), c(3))
+      e = slot(c(1), c(2), c(3))
       if (e == 0) then
         n_entry = n_entry + 1
         e = n_entry
-        self%slot(c(1), c(2), c(3)) = e
+        slot(c(1), c(2), c(3)) = e
         self%cell(:, e) = c
         self%j(e, :) = 0.0_wp
       end if

@@ -16,8 +16,7 @@ module narrow_band_m
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: narrow_band_t, narrow_band_init, reserve_for_all, find_parts, sum_by_part, drop_part, &
-            find_open_lines
+  public :: narrow_band_t, narrow_band_init, find_parts, sum_by_part, drop_part, find_open_lines
 
   type, extends(linear_operator_t) :: narrow_band_t
     ! Arrays over cells with one halo cell.
@@ -62,18 +61,6 @@ contains
     allocate (self%line(2, size(self%marked, 2), size(self%marked, 3)), source=0)
     allocate (self%cell(3, 0), self%r(0), self%open(0))
   end subroutine narrow_band_init
-
-  !> Room in the lists for all own cells and no more; what they held is lost.
-  subroutine reserve_for_all(grid, self)
-    type(grid_t), intent(in) :: grid
-    type(narrow_band_t), intent(inout) :: self
-    integer :: n
-
-    n = product(grid%hi - grid%lo + 1)
-    if (size(self%cell, 2) >= n) return
-    deallocate (self%cell, self%r, self%open)
-    allocate (self%cell(3, n), self%r(n), self%open(n))
-  end subroutine reserve_for_all
 
   !> Number of a cell in the whole domain, from 1.
   pure function global_number(grid, c) result(g)

@@ -19,8 +19,7 @@ module open_flux_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: is_wall, gives_pressure
   use solid_geometry_m, only: solid_geometry_t
-  use narrow_band_m, only: narrow_band_t, reserve_for_all, find_parts, sum_by_part, drop_part, &
-                           find_open_lines
+  use narrow_band_m, only: narrow_band_t, find_parts, sum_by_part, drop_part, find_open_lines
   use growing_m, only: ensure_capacity
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
@@ -36,9 +35,11 @@ module open_flux_m
   real(wp), parameter :: excess_max = 5.0e-7_wp
     !! of fluid that a part of the band may keep, over the cells beside it [open volumes]
 
+  !> Of the volume balance of a cell [V].
+  type(solve_control_t), parameter :: control = solve_control_t(tolerance=1.0e-12_wp, &
+    max_iterations=200)
+
   type :: open_flux_t
-    type(solve_control_t) :: control = solve_control_t(tolerance=1.0e-12_wp, max_iterations=200)
-      !! of the volume balance of a cell [V]
     integer :: iterations = 0            !! of the last step
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
@@ -76,7 +77,11 @@ contains
       self%band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
       call halo_exchange(self%band%marked, 1)
       call find_conductances(grid, old%aperture, new%aperture, self%band)
-      call reserve_for_all(grid, self%band)
+      l = product(grid%hi - grid%lo + 1)   ! room for them and no more
+      if (size(self%band%cell, 2) < l) then
+        deallocate (self%band%cell, self%band%r, self%band%open)
+        allocate (self%band%cell(3, l), self%band%r(l), self%band%open(l))
+      end if
       call list_band(grid, self%band)
       call find_parts(grid, self%band)
       call find_balances(grid, new, fluid_volume, q, self%band)
@@ -99,7 +104,7 @@ contains
     solver%work%line = self%band%line
     solver%work%singular = .false.   ! parts without an open side have been balanced
     call solver%multigrid%setup(self%band%k)
-    call conjugate_gradient(self%band, solver%multigrid, solver%rhs, solver%x, self%control, &
+    call conjugate_gradient(self%band, solver%multigrid, solver%rhs, solver%x, control, &
                             report, solver%work)
     call halo_exchange(solver%x, 1)
     self%iterations = report%iterations
@@ -369,10 +374,10 @@ contains
         end do
       end do
       call global_max(largest)
-      balanced = all(largest <= self%control%tolerance)
+      balanced = all(largest <= control%tolerance)
       if (balanced) return
       do c = 1, band%parts
-        if (largest(c) <= self%control%tolerance) call drop_part(c, band)
+        if (largest(c) <= control%tolerance) call drop_part(c, band)
       end do
     end associate
   end subroutine balance_parts

@@ -58,8 +58,7 @@ module momentum_c_ismac_m
     real(wp), allocatable :: inverse(:, :, :, :)   !! of the diagonal, 0: not an unknown [s/kg]
     real(wp), allocatable :: x(:, :, :, :), y(:, :, :, :)   !! by component, one halo cell
     ! Wall links of the viscous system while it is solved, and the bodies eliminated.
-    integer :: n = 0                               !! bodies
-    logical, allocatable :: free(:)
+    logical, allocatable :: free(:)                !! (bodies)
     type(wall_links_t), pointer :: walls => null()
     real(wp), allocatable :: mobility(:, :, :)     !! (6, 6, n) motion per impulse rate, 0: held
   contains
@@ -97,7 +96,6 @@ contains
     associate (op => self%operator)
       op%lo = grid%lo
       op%hi = grid%hi
-      op%n = n
       a = grid%lo - 1
       b = grid%hi + 1
       allocate (op%low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
@@ -291,7 +289,7 @@ contains
           end do
         end do
       end do
-      do b = 1, op%n
+      do b = 1, size(op%free)
         do l = op%walls%first(b), op%walls%first(b + 1) - 1
           associate (c => op%walls%cell(:, l))
             op%y(c(1), c(2), c(3), :) = op%y(c(1), c(2), c(3), :) &
@@ -334,7 +332,7 @@ contains
         end do
       end do
     end associate
-    do b = 1, self%n
+    do b = 1, size(self%free)
       if (.not. self%free(b)) cycle
       motion = matmul(self%mobility(:, :, b), pull_of_walls(self, b))
       do l = self%walls%first(b), self%walls%first(b + 1) - 1

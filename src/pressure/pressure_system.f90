@@ -83,7 +83,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
-    call rigid_flux_init(grid, n_bodies, self%operator%flux)
+    call rigid_flux_init(n_bodies, self%operator%flux)
     self%operator%lo = grid%lo
     self%operator%hi = grid%hi
     call elliptic_solver_init(grid, self%solver)

@@ -3,7 +3,7 @@
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
 !! and both couplings (gfortran 12): 550 to 820 B for a cell, those of the halo counted, 1240 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
-!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell. Beds: maps of 400**2
+!! cells come on top (`fit_to_bodies` in `open_flux_m`): 36 B for a cell. Beds: maps of 400**2
 !! and 1000**2 heights; each process has its own.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit

@@ -41,7 +41,6 @@ module multigrid_m
     integer :: part_lo(3) = 1, part_hi(3) = 0   !! cells of this process on level `gathered`
     real(sp), allocatable :: part(:, :, :)      !! their right side; only with many processes
     real(wp), allocatable :: part_cf(:, :, :, :) !! their coefficients
-    logical :: in_parts = .false.               !! there are many processes
     integer :: unit_exponent = 0                !! coefficients are scaled by 2**(-unit_exponent)
   contains
     procedure :: init => init_levels
@@ -66,7 +65,6 @@ contains
       l = l + 1
     end do
     allocate (self%level(l))
-    self%in_parts = nproc() > 1
     self%lo = grid%lo
     self%hi = grid%hi
     self%part_lo = grid%lo
@@ -120,7 +118,7 @@ contains
       level%alone = grid%periodic .and. n == 1
       level%seam = any(level%wraps .and. modulo(n, 2) == 1)
       if (self%gathered == 0) then
-        if (self%in_parts) level%in_parts = can_be_in_parts(level, self%part_lo, self%part_hi)
+        if (nproc() > 1) level%in_parts = can_be_in_parts(level, self%part_lo, self%part_hi)
         if (.not. level%in_parts) self%gathered = l
       end if
       level%lo = merge(self%part_lo, 1, level%in_parts)
@@ -171,11 +169,11 @@ contains
   end function can_be_in_parts
 
   !> Is level l put together from the blocks of many processes?
-  pure logical function gathers(self, l)
+  logical function gathers(self, l)
     class(multigrid_t), intent(in) :: self
     integer, intent(in) :: l
 
-    gathers = l == self%gathered .and. self%in_parts
+    gathers = l == self%gathered .and. nproc() > 1
   end function gathers
 
   !> Widths of the cells of the next level, and how the distances of the centres change.

@@ -119,7 +119,7 @@ contains
       allocate (active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                        1 - n_halo:cells(3) + n_halo))
       active = solid%alpha < 1.0_wp
-      call rigid_flux_init(block%grid, 1, flux)
+      call rigid_flux_init(1, flux)
       call build_rigid_flux(block%grid, solid, block%bodies, active, flux)
       call force_from_faces(block%grid, block%bodies, flux, block%flow%p, by_faces)
       defect = mass_defect(block%grid, fluid, solid, block%bodies, flux, block%flow)

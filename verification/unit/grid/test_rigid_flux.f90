@@ -40,7 +40,7 @@ contains
       //'size=.083,.061,.077/ '//sides(around)//body('b', position, q=quaternion_from_axis( &
       [1.0_wp, 2.0_wp, -1.0_wp], merge(0.6_wp, 0.0_wp, turned))), box)
     active(:, :, :) = box%solid%alpha < 1.0_wp
-    call rigid_flux_init(box%grid, 1, flux)
+    call rigid_flux_init(1, flux)
     call build_rigid_flux(box%grid, box%solid, box%bodies, active, flux)
   end subroutine build
 

@@ -351,7 +351,7 @@ contains
           tension%force(i, j, k, d) = (p(i, j, k) - p(i - e(1), j - e(2), k - e(3)))/g%h(d)
         end do
       end do
-      call rigid_flux_init(g, 1, flux)
+      call rigid_flux_init(1, flux)
       call build_rigid_flux(g, block%solid, block%bodies, active, flux)
       call force_from_faces(g, block%bodies, flux, p, force)
       size_of_force = norm2(force(1:3, 1))

@@ -142,7 +142,7 @@ contains
     integer :: d
 
     active = box%solid%alpha < 1.0_wp
-    call rigid_flux_init(box%grid, 1, flux)
+    call rigid_flux_init(1, flux)
     call build_rigid_flux(box%grid, box%solid, box%bodies, active, flux)
     defect = mass_defect(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
     held = held_mass(box%grid, box%bodies, flux, box%flow%rho)
