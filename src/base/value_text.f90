@@ -3,12 +3,12 @@
 !! Nothing here uses a Fortran formatted read on unchecked text: the form of a value is checked
 !! character by character first, so a bad value never raises a floating-point exception.
 module value_text_m
-  use kinds_m, only: wp, i8
+  use kinds_m, only: wp, i8, name_length
   implicit none
   private
   public :: parse_real, parse_integer, parse_logical
   public :: quoted_text, printable, sanitise, fixed_text
-  public :: lower_case, nearest_name, edit_distance
+  public :: lower_case, nearest_name, edit_distance, words_of
   public :: byte_order_mark
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
@@ -269,5 +269,20 @@ contains
 
     yes = is_decimal(word) .and. index(word, '.') == 0
   end function is_whole
+
+  !> The words of a list with one blank between them.
+  pure function words_of(list) result(words)
+    character(*), intent(in) :: list
+    character(name_length), allocatable :: words(:)
+    integer :: first, last
+
+    allocate (words(0))
+    first = 1
+    do while (first <= len(list))
+      last = first + scan(list(first:)//' ', ' ') - 2
+      words = [character(name_length) :: words, list(first:last)]
+      first = last + 2
+    end do
+  end function words_of
 
 end module value_text_m

@@ -6,7 +6,7 @@ module allowed_values_m
   use value_text_m, only: quoted_text
   implicit none
   private
-  public :: entry_t, words_of, choices
+  public :: entry_t, choices
   public :: allowed_t, any_number, positive, not_negative, share, whole, between
 
   type :: allowed_t
@@ -25,7 +25,8 @@ module allowed_values_m
   type :: entry_t
     character(name_length) :: name = ''
     character(8) :: kind = ''               !! 'number', 'text', 'name', 'logical' or 'choice'
-    character(:), allocatable :: text       !! its value as a case would write it; empty: none
+    real(wp), allocatable :: number(:)      !! values that are given or by default, of a number
+    character(:), allocatable :: text       !! of the other kinds, as a case would write it
     character(:), allocatable :: meaning
     character(:), allocatable :: example    !! assignments, that of this variable the last
     character(:), allocatable :: choices    !! words, one blank between them, if a choice
@@ -34,7 +35,7 @@ module allowed_values_m
     logical :: required = .false.
     logical :: idle = .false.               !! without meaning, because of what was chosen
   contains
-    procedure :: with_unit
+    procedure :: value => entry_value, with_unit
   end type entry_t
 
   type(allowed_t), parameter :: whole = allowed_t(whole=.true.)   !! any whole number
@@ -132,6 +133,20 @@ contains
     end if
   end function allowed_words
 
+  !> The value as a case would write it; empty for none.
+  pure function entry_value(self) result(text)
+    class(entry_t), intent(in) :: self
+    character(:), allocatable :: text
+
+    if (self%kind /= 'number') then
+      text = self%text
+    else if (self%allowed%whole) then
+      text = to_text(nint(self%number))
+    else
+      text = to_text(self%number)
+    end if
+  end function entry_value
+
   !> The meaning, with the unit if there is one.
   pure function with_unit(self) result(text)
     class(entry_t), intent(in) :: self
@@ -140,21 +155,6 @@ contains
     text = self%meaning
     if (self%allowed%unit /= '') text = text//' ['//trim(self%allowed%unit)//']'
   end function with_unit
-
-  !> The words of a list with one blank between them.
-  pure function words_of(list) result(words)
-    character(*), intent(in) :: list
-    character(name_length), allocatable :: words(:)
-    integer :: first, last
-
-    allocate (words(0))
-    first = 1
-    do while (first <= len(list))
-      last = first + scan(list(first:)//' ', ' ') - 2
-      words = [character(name_length) :: words, list(first:last)]
-      first = last + 2
-    end do
-  end function words_of
 
   !> Words as a message or a case shows them, between quotes with commas; empty ones left out.
   pure function choices(words) result(text)

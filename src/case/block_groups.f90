@@ -185,45 +185,45 @@ contains
     call v%real('drag_coefficient', shape%drag_coefficient, not_negative('-'), &
       'for physics = ''light'' only: C of the drag on each facet, C/3 of the whole surface for ' &
       //'a compact block; `mics-tools calibrate` fits it to resolved falls', example='0.6')
-    call visit_rock(v, shape)
+    call visit_rock()
     call v%judge('name kind size file scale refinement seed variants mass_50 uniformity mass_min ' &
       //'mass_max elongation blockiness', shape%faulty)
+  contains
+    !> The variables of `&shape` that a family of stones has.
+    subroutine visit_rock()
+      character(*), parameter :: kind = 'kind = ''rock''  '
+
+      call v%integer('seed', shape%seed, whole, 'for kind = ''rock'': the stones; another ' &
+        //'number draws others, the same number the same on every machine', &
+        example=kind//'seed = 7')
+      call v%integer('variants', shape%variants, between(1, max_variants), 'for kind = ''rock'': ' &
+        //'stones of the family, NAME-01 and so on; each drop draws one, each &body takes the ' &
+        //'next', &
+        example=kind//'variants = 50')
+      call v%real('mass_50', shape%mass_50, positive('kg'), 'for kind = ''rock'': half of the ' &
+        //'stones are lighter, before mass_min and mass_max cut the grade', &
+        example=kind//'mass_50 = 60')
+      call v%real('uniformity', shape%uniformity, between(0.1_wp, 100.0_wp, '-'), 'for kind = ' &
+        //'''rock'': n of Rosin and Rammler, mass = mass_50 (ln(1/(1 - y))/ln 2)^(1/n) with the ' &
+        //'share y of the stones lighter; larger is more uniform', example=kind//'uniformity = 5')
+      call v%real('mass_min', shape%mass_min, not_negative('kg', zero='0 means no bound'), &
+        'for kind = ''rock'': no stone is lighter', example=kind//'mass_min = 0.05')
+      call v%real('mass_max', shape%mass_max, not_negative('kg', zero='0 means no bound'), &
+        'for kind = ''rock'': no stone is heavier', example=kind//'mass_max = 0.2')
+      call v%real('elongation', shape%elongation, between(1.0_wp, 10.0_wp, '-'), &
+        'for kind = ''rock'': longest over shortest edge of the box around a stone', &
+        example=kind//'elongation = 2')
+      call v%real('blockiness', shape%blockiness, between(0.3_wp, 0.9_wp, '-'), &
+        'for kind = ''rock'': volume of a stone over that of the box around it', &
+        example=kind//'blockiness = 0.6')
+      if (shape%kind /= 'rock') return
+      call v%require('name', len_trim(shape%name) <= name_length - 5, 'the name of a family has ' &
+        //'at most '//to_text(name_length - 5)//' letters, its stones are numbered')
+      if (shape%mass_max <= 0.0_wp .or. .not. v%good('mass_min mass_max mass_50 uniformity')) return
+      call v%require('mass_max', shape%mass_max > shape%mass_min, 'must be above mass_min = ' &
+        //to_text(shape%mass_min)//' kg, or 0 for no bound')
+    end subroutine visit_rock
   end subroutine visit_shape
-
-  !> The variables of `&shape` that a family of stones has.
-  subroutine visit_rock(v, shape)
-    type(group_visitor_t), intent(inout) :: v
-    type(shape_input_t), intent(inout) :: shape
-    character(*), parameter :: kind = 'kind = ''rock''  '
-
-    call v%integer('seed', shape%seed, whole, 'for kind = ''rock'': the stones; another ' &
-      //'number draws others, the same number the same on every machine', example=kind//'seed = 7')
-    call v%integer('variants', shape%variants, between(1, max_variants), 'for kind = ''rock'': ' &
-      //'stones of the family, NAME-01 and so on; each drop draws one, each &body takes the next', &
-      example=kind//'variants = 50')
-    call v%real('mass_50', shape%mass_50, positive('kg'), 'for kind = ''rock'': half of the ' &
-      //'stones are lighter, before mass_min and mass_max cut the grade', &
-      example=kind//'mass_50 = 60')
-    call v%real('uniformity', shape%uniformity, between(0.1_wp, 100.0_wp, '-'), 'for kind = ' &
-      //'''rock'': n of Rosin and Rammler, mass = mass_50 (ln(1/(1 - y))/ln 2)^(1/n) with the ' &
-      //'share y of the stones lighter; larger is more uniform', example=kind//'uniformity = 5')
-    call v%real('mass_min', shape%mass_min, not_negative('kg', zero='0 means no bound'), &
-      'for kind = ''rock'': no stone is lighter', example=kind//'mass_min = 0.05')
-    call v%real('mass_max', shape%mass_max, not_negative('kg', zero='0 means no bound'), &
-      'for kind = ''rock'': no stone is heavier', example=kind//'mass_max = 0.2')
-    call v%real('elongation', shape%elongation, between(1.0_wp, 10.0_wp, '-'), &
-      'for kind = ''rock'': longest over shortest edge of the box around a stone', &
-      example=kind//'elongation = 2')
-    call v%real('blockiness', shape%blockiness, between(0.3_wp, 0.9_wp, '-'), &
-      'for kind = ''rock'': volume of a stone over that of the box around it', &
-      example=kind//'blockiness = 0.6')
-    if (shape%kind /= 'rock') return
-    call v%require('name', len_trim(shape%name) <= name_length - 5, 'the name of a family has at ' &
-      //'most '//to_text(name_length - 5)//' letters, its stones are numbered')
-    if (shape%mass_max <= 0.0_wp .or. .not. v%good('mass_min mass_max mass_50 uniformity')) return
-    call v%require('mass_max', shape%mass_max > shape%mass_min, 'must be above mass_min = ' &
-      //to_text(shape%mass_min)//' kg, or 0 for no bound')
-  end subroutine visit_rock
 
   !> What the size of a kind of shape means [m].
   pure function size_meaning(kind) result(meaning)
@@ -291,7 +291,7 @@ contains
     if (.not. v%good('file')) table = v%given('file')
     call v%without_meaning(table, 'shape shapes weights position to count first_time interval ' &
       //'orientation quaternion axis angle_deg velocity', 'a file of places', 'the file has it')
-    call visit_drop_shapes(v, drop, shapes, table)
+    call visit_drop_shapes()
     call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
       example='0.15, 0.05, 0.16', required=.not. table)
     call v%integer('count', drop%count, between(1, max_drops), 'how many blocks', example='6')
@@ -316,75 +316,70 @@ contains
       'each block is tilted at random by up to this about an axis at random', example='10')
     call v%integer('seed', drop%seed, whole, 'the random places and attitudes: ' &
       //'another number draws others, the same number the same on every machine', example='7')
-    call visit_handling(v, drop%handling)
+    call visit_handling(drop%handling)
     call v%without_meaning(drop%handling%lowering_speed > 0.0_wp, 'velocity', &
       'lowering_speed > 0', 'a block is let go with the speed of lowering')
     call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
       example='0, 0, -0.1')
     call v%judge('file shape shapes weights position count to first_time interval spread ' &
       //'orientation quaternion axis angle_deg tilt_deg seed', drop%faulty)
+  contains
+    !> What a drop drops: blocks of one shape, or of several drawn by weight.
+    subroutine visit_drop_shapes()
+      type(allowed_t) :: weights
+      logical :: several
+      integer :: i, n
+
+      several = v%given('shapes') .or. drop%shapes(1) /= ''
+      call v%without_meaning(several, 'shape', 'shapes', 'give one of the two')
+      call visit_shape_name(v, drop%shape, shapes, required=.not. (table .or. several))
+      call v%names('shapes', drop%shapes, 'several shapes, of which the seed draws one for each ' &
+        //'block, in place of shape', example='''hexapod'', ''hexapod''')
+      n = count(drop%shapes /= '')
+      do i = 1, n
+        call require_shape(v, 'shapes', drop%shapes(i), shapes)
+      end do
+      call v%without_meaning(.not. (several .or. table), 'weights', 'one shape', &
+        'shapes draws from several')
+      weights = not_negative('-')
+      weights%fewest = 1
+      call v%real('weights', drop%weights, weights, 'how likely each of shapes is beside others', &
+        example='shapes = ''hexapod'', ''hexapod''  weights = 3, 1')
+      if (.not. (several .and. v%good('shapes weights'))) return
+      if (.not. v%given('weights')) drop%weights(:n) = 1.0_wp
+      call v%require('weights', count(is_given(drop%weights)) == n, &
+        'must be '//to_text(n)//', one for each of shapes')
+      call v%require('weights', any(drop%weights > 0.0_wp), 'one of them must be above 0')
+    end subroutine visit_drop_shapes
+
+    !> How a crane handles the blocks of a drop.
+    subroutine visit_handling(handling)
+      type(handling_t), intent(inout) :: handling
+      logical :: lowered
+
+      call v%option('if_blocked', handling%if_blocked, 'wait raise skip', 'what happens to a ' &
+        //'block whose place is taken: it waits for room, is raised above what lies there, or ' &
+        //'left out', example='''raise''')
+      call v%real('lowering_speed', handling%lowering_speed, &
+        not_negative('m/s', zero='0 means let go at once'), &
+        'the block is held and lowered at this speed until its release', example='0.1')
+      lowered = handling%lowering_speed > 0.0_wp .or. .not. v%good('lowering_speed')
+      call v%option('release', handling%release, 'place height touch', 'where a lowered block is ' &
+        //'let go: at its place, to which it comes from the water level (without one the top of ' &
+        //'the tank); or, lowered from its place, at release_height over what lies below, or ' &
+        //'where it touches that', example='lowering_speed = 0.1  release = ''touch''')
+      call v%require('release', lowered .or. handling%release == 'place', &
+        'needs lowering_speed above 0')
+      call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
+        'release_height', 'release = '//quoted_text(trim(handling%release)), &
+        'only ''height'' has it')
+      if (handling%release == 'height') call v%needed('release_height', &
+        'height over what lies below [m]')
+      call v%real('release_height', handling%release_height, not_negative('m'), &
+        'how far above what lies below a lowered block is let go', &
+        example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
+    end subroutine visit_handling
   end subroutine visit_drop
-
-  !> What a drop drops: blocks of one shape, or of several drawn by weight.
-  subroutine visit_drop_shapes(v, drop, shapes, table)
-    type(group_visitor_t), intent(inout) :: v
-    type(drop_input_t), intent(inout) :: drop
-    character(name_length), intent(in) :: shapes(:)
-    logical, intent(in) :: table   !! the shapes come from a file
-    type(allowed_t) :: weights
-    logical :: several
-    integer :: i, n
-
-    several = v%given('shapes') .or. drop%shapes(1) /= ''
-    call v%without_meaning(several, 'shape', 'shapes', 'give one of the two')
-    call visit_shape_name(v, drop%shape, shapes, required=.not. (table .or. several))
-    call v%names('shapes', drop%shapes, 'several shapes, of which the seed draws one for each ' &
-      //'block, in place of shape', example='''hexapod'', ''hexapod''')
-    n = count(drop%shapes /= '')
-    do i = 1, n
-      call require_shape(v, 'shapes', drop%shapes(i), shapes)
-    end do
-    call v%without_meaning(.not. (several .or. table), 'weights', 'one shape', &
-      'shapes draws from several')
-    weights = not_negative('-')
-    weights%fewest = 1
-    call v%real('weights', drop%weights, weights, 'how likely each of shapes is beside others', &
-      example='shapes = ''hexapod'', ''hexapod''  weights = 3, 1')
-    if (.not. (several .and. v%good('shapes weights'))) return
-    if (.not. v%given('weights')) drop%weights(:n) = 1.0_wp
-    call v%require('weights', count(is_given(drop%weights)) == n, &
-      'must be '//to_text(n)//', one for each of shapes')
-    call v%require('weights', any(drop%weights > 0.0_wp), 'one of them must be above 0')
-  end subroutine visit_drop_shapes
-
-  !> How a crane handles the blocks of a drop.
-  subroutine visit_handling(v, handling)
-    type(group_visitor_t), intent(inout) :: v
-    type(handling_t), intent(inout) :: handling
-    logical :: lowered
-
-    call v%option('if_blocked', handling%if_blocked, 'wait raise skip', 'what happens to a block ' &
-      //'whose place is taken: it waits for room, is raised above what lies there, or left out', &
-      example='''raise''')
-    call v%real('lowering_speed', handling%lowering_speed, &
-      not_negative('m/s', zero='0 means let go at once'), &
-      'the block is held and lowered at this speed until its release', example='0.1')
-    lowered = handling%lowering_speed > 0.0_wp .or. .not. v%good('lowering_speed')
-    call v%option('release', handling%release, 'place height touch', 'where a lowered block is ' &
-      //'let go: at its place, to which it comes from the water level (without one the top of ' &
-      //'the tank); or, lowered from its place, at release_height over what lies below, or where ' &
-      //'it touches that', example='lowering_speed = 0.1  release = ''touch''')
-    call v%require('release', lowered .or. handling%release == 'place', &
-      'needs lowering_speed above 0')
-    call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
-      'release_height', 'release = '//quoted_text(trim(handling%release)), &
-      'only ''height'' has it')
-    if (handling%release == 'height') call v%needed('release_height', &
-      'height over what lies below [m]')
-    call v%real('release_height', handling%release_height, not_negative('m'), &
-      'how far above what lies below a lowered block is let go', &
-      example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
-  end subroutine visit_handling
 
   !> The shape of a body or drop: one that exists.
   subroutine visit_shape_name(v, shape, shapes, required)

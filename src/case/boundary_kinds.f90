@@ -2,7 +2,7 @@
 !!
 !! A new kind is one more entry of each list here, and its physics where a rule of its own begins.
 module boundary_kinds_m
-  use allowed_values_m, only: words_of
+  use value_text_m, only: words_of
   implicit none
   private
   public :: no_side, side_no_slip, side_slip, side_open, side_periodic, side_inflow, side_outflow

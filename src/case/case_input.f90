@@ -14,14 +14,13 @@ module case_input_m
   use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: group_text_t, cut_groups
   use string_builder_m, only: string_builder_t
-  use allowed_values_m, only: words_of
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: visit_run, visit_grid, visit_boundary, visit_fluid, visit_water, &
     visit_numerics, side_name
   use block_groups_m, only: visit_contact, visit_bed, visit_start, visit_shape, visit_body, &
     visit_drop
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text, &
-    parse_integer
+    parse_integer, words_of
   implicit none
   private
   public :: read_case, parameters_text, group_names, first_repeated, list_entries
@@ -205,10 +204,10 @@ contains
     type(group_visitor_t), intent(inout) :: v
     integer :: d, i
 
-    call check_names(case, v%problems)
-    call check_streams(list, case, v)
-    if (case%run%physics == 'light') call check_given_water(list, case, v)
-    call find_idle(list, case, v)
+    call check_names()
+    call check_streams()
+    if (case%run%physics == 'light') call check_given_water()
+    call find_idle()
     i = first_of(list, 'grid')
     if (i == 0 .or. case%grid%cells_faulty) return
     call v%start(list(i))
@@ -219,86 +218,166 @@ contains
         'one cell in a direction makes the case 2-D, then '//side_name(1, d)//' and ' &
         //side_name(2, d)//' must both be ''slip'' or ''periodic''')
     end do
-  end subroutine check_together
+  contains
+    !> Names of shapes are unique, capital or small letters apart, those of stones included.
+    subroutine check_names()
+      character(name_length) :: small
+      integer :: i, j, k
 
-  !> Look through all groups of a case that has been read: one warning for all groups of a name
-  !! without a meaning, then one for each group with variables without one.
-  subroutine find_idle(list, case, v)
-    type(group_text_t), intent(inout) :: list(:)
-    type(case_t), intent(in) :: case
-    type(group_visitor_t), intent(inout) :: v
-    character(:), allocatable :: chosen, groups, subject
-    integer :: i, k, n, line
-
-    chosen = 'physics = '''//trim(case%run%physics)//''''
-    groups = ''
-    if (case%run%physics == 'fluid') groups = 'contact start shape body drop'
-    if (any(case%run%physics == ['dry  ', 'light'])) groups = 'water numerics'
-    associate (names => words_of(groups))
-      do k = 1, size(names)
-        n = 0
-        do i = size(list), 1, -1
-          if (list(i)%name /= names(k)) cycle
-          n = n + 1
-          line = list(i)%line
+      do i = 1, size(case%shape)
+        small = lower_case(case%shape(i)%name)
+        if (small == '') cycle
+        do j = 1, size(case%shape)
+          if (j == i) cycle
+          if (small /= lower_case(case%shape(j)%name) .or. j > i) then
+            if (.not. any([(lower_case(member_name(case%shape(j), k)) == small, &
+              k=1, members(case%shape(j)))])) cycle   ! nor that of a stone
+          end if
+          call v%problems%add_message('&shape name = '//quoted_text(trim(case%shape(i)%name)) &
+            //': the &shape on line '//to_text(case%shape(j)%line)//' has this name already', &
+            case%shape(i)%line)
+          exit
         end do
-        subject = '&'//trim(names(k))//': has'
-        if (n > 1) subject = to_text(n)//' groups &'//trim(names(k))//': have'
-        if (n > 0) call v%passed_over%add_message(subject//' no meaning with '//chosen &
-          //', passed over', line)
       end do
-    end associate
-    do i = 1, size(list)
+    end subroutine check_names
+
+    !> What enters through an inflow must find a way out; an outflow needs a level to keep, and
+    !! gravity along it.
+    subroutine check_streams()
+      logical :: way_out
+      integer :: d, s, i
+
+      i = first_of(list, 'boundary')
+      if (i == 0 .or. .not. has_flow(case%run)) return
       call v%start(list(i))
-      call v%pass_over(idle_variables(list(i)%name, case), chosen)
-      if (list(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
-        call v%report(': has no meaning with &fluid single_phase = .true.; the liquid fills the ' &
-          //'whole tank')
-      end if
-      list(i) = v%group
-    end do
-  end subroutine find_idle
+      way_out = any(gives_pressure([side_code(case%boundary%kind)])) .or. any(case%boundary%faulty)
+      associate (fluid => case%fluid)
+        do d = 1, 3
+          do s = 1, 2
+            if (case%boundary%faulty(s, d)) cycle
+            call v%require(side_name(s, d), case%boundary%kind(s, d) /= 'inflow' .or. way_out, &
+              'what flows in must leave, another side must be ''open'' or ''outflow''')
+            if (case%boundary%kind(s, d) /= 'outflow') cycle
+            if (.not. any(abs(fluid%gravity) > 0.0_wp)) cycle
+            call v%require(side_name(s, d), maxloc(abs(fluid%gravity), 1) /= d, &
+              'gravity acts across this side, it can be ''open''')
+            call v%require(side_name(s, d), fluid%single_phase .or. is_given(fluid%water_level), &
+              'needs &fluid water_level, the level it keeps')
+          end do
+        end do
+      end associate
+    end subroutine check_streams
 
-  !> Variables of a group without a meaning in the physics of the case, one blank between them:
-  !! 'dry' has of the fluid only gravity; 'light' a water of given density, level and current;
-  !! without blocks nothing settles, nothing rubs on a slippery wall, and only a bed is solid.
-  pure function idle_variables(group, case) result(names)
-    character(*), intent(in) :: group
-    type(case_t), intent(in) :: case
-    character(:), allocatable :: names
+    !> What a water without a flow has: a level between gravity and the sides, and a current along
+    !! it.
+    subroutine check_given_water()
+      character(*), parameter :: light = 'physics = ''light'' '
+      integer :: i, d, s
 
-    names = ''
-    select case (trim(case%run%physics)//' '//group)
-    case ('dry run', 'light run'); names = 'cfl_max'
-    case ('fluid run'); names = 'stop_when_settled rest_speed rest_time'
-    case ('dry boundary'); names = velocities_of('inflow', case)
-    case ('fluid boundary'); names = velocities_of('slip', case)
-    case ('dry fluid'); names = 'liquid_density liquid_viscosity gas_density gas_viscosity ' &
-      //'water_level surface_tension single_phase velocity initial_state'
-    case ('light fluid'); names = 'liquid_viscosity gas_density gas_viscosity surface_tension ' &
-      //'initial_state'
-    case ('fluid numerics'); if (len_trim(case%bed%file) == 0) names = 'solid_fraction subcells'
-    case ('dry contact', 'light contact'); names = 'lubrication'
-    case ('dry shape', 'coupled shape'); names = 'drag_coefficient'
-    case default   ! all of it counts, or nothing
-    end select
-  end function idle_variables
-
-  !> The names of the velocities of all sides of a kind, one blank between them.
-  pure function velocities_of(kind, case) result(names)
-    character(*), intent(in) :: kind
-    type(case_t), intent(in) :: case
-    character(:), allocatable :: names
-    integer :: d, s
-
-    names = ''
-    do d = 1, 3
-      do s = 1, 2
-        if (case%boundary%kind(s, d) == kind) names = names//' '//side_name(s, d)//'_velocity'
+      call v%start_empty('fluid')
+      i = first_of(list, 'fluid')
+      if (i > 0) call v%start(list(i))
+      associate (fluid => case%fluid)
+        call v%require('single_phase', .not. fluid%single_phase, &
+          light//'needs a level of the water')
+        if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
+            .and. v%good('water_level')) call v%report(': '//light//'needs water_level, the ' &
+          //'level of the water that is given [m]')
+        call v%require('gravity', .not. any(abs(fluid%gravity(1:2)) > 0.0_wp) &
+          .and. fluid%gravity(3) < 0.0_wp, light//'has a level, gravity must point straight down')
+        call v%require('velocity', .not. abs(fluid%velocity(3)) > 0.0_wp, &
+          light//'has a current along the level, its z component must be 0')
+      end associate
+      i = first_of(list, 'boundary')
+      if (i == 0) return
+      call v%start(list(i))
+      do d = 1, 3
+        do s = 1, 2
+          if (case%boundary%faulty(s, d)) cycle
+          call v%require(side_name(s, d), all(case%boundary%kind(s, d) /= ['inflow ', 'outflow']), &
+            light//'has no stream through a side; the current is &fluid velocity')
+        end do
       end do
-    end do
-    names = trim(adjustl(names))
-  end function velocities_of
+      call v%require('z_min', case%boundary%kind(1, 3) /= 'open', &
+        light//'keeps its water, the floor cannot be open')
+      call v%require('z_max', case%boundary%kind(2, 3) /= 'periodic', &
+        light//'has a level, z cannot be periodic')
+    end subroutine check_given_water
+
+    !> Look through all groups of a case that has been read: one warning for all groups of a name
+    !! without a meaning, then one for each group with variables without one.
+    subroutine find_idle()
+      character(:), allocatable :: chosen, groups, subject
+      integer :: i, k, n, line
+
+      chosen = 'physics = '''//trim(case%run%physics)//''''
+      groups = ''
+      if (case%run%physics == 'fluid') groups = 'contact start shape body drop'
+      if (any(case%run%physics == ['dry  ', 'light'])) groups = 'water numerics'
+      associate (names => words_of(groups))
+        do k = 1, size(names)
+          n = 0
+          do i = size(list), 1, -1
+            if (list(i)%name /= names(k)) cycle
+            n = n + 1
+            line = list(i)%line
+          end do
+          subject = '&'//trim(names(k))//': has'
+          if (n > 1) subject = to_text(n)//' groups &'//trim(names(k))//': have'
+          if (n > 0) call v%passed_over%add_message(subject//' no meaning with '//chosen &
+            //', passed over', line)
+        end do
+      end associate
+      do i = 1, size(list)
+        call v%start(list(i))
+        call v%pass_over(idle_variables(list(i)%name), chosen)
+        if (list(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
+          call v%report(': has no meaning with &fluid single_phase = .true.; the liquid fills ' &
+            //'the whole tank')
+        end if
+        list(i) = v%group
+      end do
+    end subroutine find_idle
+
+    !> Variables of a group without a meaning in the physics of the case, one blank between them:
+    !! 'dry' has of the fluid only gravity; 'light' a water of given density, level and current;
+    !! without blocks nothing settles, nothing rubs on a slippery wall, and only a bed is solid.
+    pure function idle_variables(group) result(names)
+      character(*), intent(in) :: group
+      character(:), allocatable :: names
+
+      names = ''
+      select case (trim(case%run%physics)//' '//group)
+      case ('dry run', 'light run'); names = 'cfl_max'
+      case ('fluid run'); names = 'stop_when_settled rest_speed rest_time'
+      case ('dry boundary'); names = velocities_of('inflow')
+      case ('fluid boundary'); names = velocities_of('slip')
+      case ('dry fluid'); names = 'liquid_density liquid_viscosity gas_density gas_viscosity ' &
+        //'water_level surface_tension single_phase velocity initial_state'
+      case ('light fluid'); names = 'liquid_viscosity gas_density gas_viscosity surface_tension ' &
+        //'initial_state'
+      case ('fluid numerics'); if (len_trim(case%bed%file) == 0) names = 'solid_fraction subcells'
+      case ('dry contact', 'light contact'); names = 'lubrication'
+      case ('dry shape', 'coupled shape'); names = 'drag_coefficient'
+      case default   ! all of it counts, or nothing
+      end select
+    end function idle_variables
+
+    !> The names of the velocities of all sides of a kind, one blank between them.
+    pure function velocities_of(kind) result(names)
+      character(*), intent(in) :: kind
+      character(:), allocatable :: names
+      integer :: d, s
+
+      names = ''
+      do d = 1, 3
+        do s = 1, 2
+          if (case%boundary%kind(s, d) == kind) names = names//' '//side_name(s, d)//'_velocity'
+        end do
+      end do
+      names = trim(adjustl(names))
+    end function velocities_of
+  end subroutine check_together
 
   !> Number of the first group of a name; 0 if there is none.
   pure function first_of(list, name) result(i)
@@ -310,101 +389,10 @@ contains
     i = findloc([(list(k)%name == name, k=1, size(list))], .true., 1)
   end function first_of
 
-  !> What enters through an inflow must find a way out; an outflow needs a level to keep, and
-  !! gravity along it.
-  subroutine check_streams(list, case, v)
-    type(group_text_t), intent(in) :: list(:)
-    type(case_t), intent(in) :: case
-    type(group_visitor_t), intent(inout) :: v
-    logical :: way_out
-    integer :: d, s, i
-
-    i = first_of(list, 'boundary')
-    if (i == 0 .or. .not. has_flow(case%run)) return
-    call v%start(list(i))
-    way_out = any(gives_pressure([side_code(case%boundary%kind)])) .or. any(case%boundary%faulty)
-    associate (fluid => case%fluid)
-      do d = 1, 3
-        do s = 1, 2
-          if (case%boundary%faulty(s, d)) cycle
-          call v%require(side_name(s, d), case%boundary%kind(s, d) /= 'inflow' .or. way_out, &
-            'what flows in must leave, another side must be ''open'' or ''outflow''')
-          if (case%boundary%kind(s, d) /= 'outflow') cycle
-          if (.not. any(abs(fluid%gravity) > 0.0_wp)) cycle
-          call v%require(side_name(s, d), maxloc(abs(fluid%gravity), 1) /= d, &
-            'gravity acts across this side, it can be ''open''')
-          call v%require(side_name(s, d), fluid%single_phase .or. is_given(fluid%water_level), &
-            'needs &fluid water_level, the level it keeps')
-        end do
-      end do
-    end associate
-  end subroutine check_streams
-
-  !> What a water without a flow has: a level between gravity and the sides, and a current along it.
-  subroutine check_given_water(list, case, v)
-    type(group_text_t), intent(in) :: list(:)
-    type(case_t), intent(in) :: case
-    type(group_visitor_t), intent(inout) :: v
-    character(*), parameter :: light = 'physics = ''light'' '
-    integer :: i, d, s
-
-    call v%start_empty('fluid')
-    i = first_of(list, 'fluid')
-    if (i > 0) call v%start(list(i))
-    associate (fluid => case%fluid)
-      call v%require('single_phase', .not. fluid%single_phase, light//'needs a level of the water')
-      if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
-          .and. v%good('water_level')) call v%report(': '//light//'needs water_level, the level ' &
-        //'of the water that is given [m]')
-      call v%require('gravity', .not. any(abs(fluid%gravity(1:2)) > 0.0_wp) &
-        .and. fluid%gravity(3) < 0.0_wp, light//'has a level, gravity must point straight down')
-      call v%require('velocity', .not. abs(fluid%velocity(3)) > 0.0_wp, &
-        light//'has a current along the level, its z component must be 0')
-    end associate
-    i = first_of(list, 'boundary')
-    if (i == 0) return
-    call v%start(list(i))
-    do d = 1, 3
-      do s = 1, 2
-        if (case%boundary%faulty(s, d)) cycle
-        call v%require(side_name(s, d), all(case%boundary%kind(s, d) /= ['inflow ', 'outflow']), &
-          light//'has no stream through a side; the current is &fluid velocity')
-      end do
-    end do
-    call v%require('z_min', case%boundary%kind(1, 3) /= 'open', &
-      light//'keeps its water, the floor cannot be open')
-    call v%require('z_max', case%boundary%kind(2, 3) /= 'periodic', &
-      light//'has a level, z cannot be periodic')
-  end subroutine check_given_water
-
-  !> Names of shapes are unique, capital or small letters apart, those of stones included.
-  subroutine check_names(case, problems)
-    type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: problems
-    character(name_length) :: small
-    integer :: i, j, k
-
-    do i = 1, size(case%shape)
-      small = lower_case(case%shape(i)%name)
-      if (small == '') cycle
-      do j = 1, size(case%shape)
-        if (j == i) cycle
-        if (small /= lower_case(case%shape(j)%name) .or. j > i) then
-          if (.not. any([(lower_case(member_name(case%shape(j), k)) == small, &
-            k=1, members(case%shape(j)))])) cycle   ! nor that of a stone
-        end if
-        call problems%add_message('&shape name = '//quoted_text(trim(case%shape(i)%name)) &
-          //': the &shape on line '//to_text(case%shape(j)%line)//' has this name already', &
-          case%shape(i)%line)
-        exit
-      end do
-    end do
-  end subroutine check_names
-
   !> Every parameter of a case after defaults, as the text of a case with the same meaning.
   function parameters_text(case) result(text)
     type(case_t), intent(in) :: case
-    character(:), allocatable :: text
+    character(:), allocatable :: text, value
     type(string_builder_t) :: lines
     type(case_t) :: copy   ! reading a group in which nothing is given leaves it as it is
     type(group_visitor_t) :: v
@@ -426,8 +414,9 @@ contains
         call visit_group(v, copy, group_names(g), i, no_names)
         call lines%add_line('&'//trim(group_names(g)))
         do k = 1, v%n
-          if (v%entry(k)%idle .or. len(v%entry(k)%text) == 0) cycle
-          call lines%add_line('  '//trim(v%entry(k)%name)//' = '//v%entry(k)%text)
+          value = v%entry(k)%value()
+          if (v%entry(k)%idle .or. len(value) == 0) cycle
+          call lines%add_line('  '//trim(v%entry(k)%name)//' = '//value)
         end do
         call lines%add_line('/')
       end do

@@ -50,9 +50,11 @@ contains
     type(problems_t), intent(inout) :: problems
     type(words_t) :: words
     character(1) :: separator
-    integer :: at, last, line, n, n_lines, i
-    integer :: first(max_columns), final(max_columns)
-    logical :: quoted, remark
+    integer :: at, last, line, n_lines, i
+    integer :: n          ! cells of a line; what is beyond `max_columns` is cut off
+    integer :: first(max_columns), final(max_columns)   ! character of each
+    logical :: quoted     ! the last one has no second "
+    logical :: remark
 
     allocate (table%name(0), table%line(0), table%first(0, 0), table%last(0, 0))
     call read_whole(file, words)
@@ -83,7 +85,7 @@ contains
           if (index(row, ';') > 0) separator = ';'
         end if
       end associate
-      call cut_line(table%text, first(1), last, separator, n, first, final, quoted)
+      call cut_line(first(1))
       if (remark) then   ! it may be a row that is lost if it has as many cells and a number in them
         if (n /= size(table%name)) cycle
         if (.not. any([(first(i) <= final(i) .and. verify(table%text(first(i):final(i)), &
@@ -99,86 +101,74 @@ contains
         n = n - 1
       end do
       if (size(table%name) > 0) then
-        call add_row(table, line, n, first, final, problems)
+        call add_row()
         cycle
       end if
       deallocate (table%line, table%first, table%last)
       allocate (table%line(n_lines), table%first(n, 0:n_lines), table%last(n, 0:n_lines))
       table%first(:, 0) = first(:n)
       table%last(:, 0) = final(:n)
-      call set_names(table, line, n, problems)
+      call set_names()
     end do
     if (size(table%name) == 0) call problems%add_message('the file is empty')
+  contains
+    !> The cells of a line: first and last character of each, quotes included.
+    subroutine cut_line(begin)
+      integer, value :: begin   !! of the line, then of a cell
+      integer :: i
+
+      n = 0
+      quoted = .false.
+      do i = begin, last + 1
+        if (i <= last) then
+          if (table%text(i:i) == '"') quoted = .not. quoted
+          if (quoted .or. table%text(i:i) /= separator) cycle
+        end if
+        if (n == size(first)) exit
+        n = n + 1
+        first(n) = begin + verify(table%text(begin:i - 1)//'.', blank) - 1
+        final(n) = begin + verify(table%text(begin:i - 1), blank, back=.true.) - 1
+        begin = i + 1
+      end do
+    end subroutine cut_line
+
+    !> The names of the columns.
+    subroutine set_names()
+      character(:), allocatable :: word
+      integer :: c
+
+      deallocate (table%name)
+      allocate (table%name(n))
+      allocate (table%factor(n), source=1.0_wp)
+      table%head = line
+      do c = 1, n
+        word = lower_case(table%cell(0, c))//'['
+        table%name(c) = word(:scan(word(2:), '[('))
+        if (len_trim(table%name(c)) == 0) call problems%add_message('line '//to_text(line) &
+          //', column '//to_text(c)//': has no name')
+        if (any(table%name(:c - 1) == table%name(c)) .and. len_trim(table%name(c)) > 0) then
+          call problems%add_message(table%place(0, c)//': is there twice')
+        end if
+      end do
+    end subroutine set_names
+
+    !> A row, which has a cell for each name.
+    subroutine add_row()
+      integer :: width
+
+      width = size(table%name)
+      if (n /= width) then
+        call problems%add_message('line '//to_text(line)//', column '//to_text(min(n, width) + 1) &
+          //': '//to_text(n)//trim(merge(' cell ', ' cells', n == 1)) &
+          //', but the table has '//to_text(width)//' columns')
+        return
+      end if
+      table%n_rows = table%n_rows + 1
+      table%line(table%n_rows) = line
+      table%first(:, table%n_rows) = first(:width)
+      table%last(:, table%n_rows) = final(:width)
+    end subroutine add_row
   end subroutine read_table
-
-  !> The cells of a line: first and last character of each, quotes included.
-  pure subroutine cut_line(text, begin, last, separator, n, first, final, quoted)
-    character(*), intent(in) :: text
-    integer, value :: begin                      !! of the line, then of a cell
-    integer, intent(in) :: last                  !! character of the line
-    character(1), intent(in) :: separator
-    integer, intent(out) :: n                    !! cells; what is beyond `max_columns` is cut off
-    integer, intent(out) :: first(:), final(:)
-    logical, intent(out) :: quoted               !! the last one has no second "
-    integer :: i
-
-    n = 0
-    quoted = .false.
-    do i = begin, last + 1
-      if (i <= last) then
-        if (text(i:i) == '"') quoted = .not. quoted
-        if (quoted .or. text(i:i) /= separator) cycle
-      end if
-      if (n == size(first)) exit
-      n = n + 1
-      first(n) = begin + verify(text(begin:i - 1)//'.', blank) - 1
-      final(n) = begin + verify(text(begin:i - 1), blank, back=.true.) - 1
-      begin = i + 1
-    end do
-  end subroutine cut_line
-
-  !> The names of the columns.
-  subroutine set_names(table, line, n, problems)
-    type(csv_table_t), intent(inout) :: table
-    integer, intent(in) :: line, n
-    type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: word
-    integer :: c
-
-    deallocate (table%name)
-    allocate (table%name(n))
-    allocate (table%factor(n), source=1.0_wp)
-    table%head = line
-    do c = 1, n
-      word = lower_case(table%cell(0, c))//'['
-      table%name(c) = word(:scan(word(2:), '[('))
-      if (len_trim(table%name(c)) == 0) call problems%add_message('line '//to_text(line) &
-        //', column '//to_text(c)//': has no name')
-      if (any(table%name(:c - 1) == table%name(c)) .and. len_trim(table%name(c)) > 0) then
-        call problems%add_message(table%place(0, c)//': is there twice')
-      end if
-    end do
-  end subroutine set_names
-
-  !> A row, which has a cell for each name.
-  subroutine add_row(table, line, n, first, final, problems)
-    type(csv_table_t), intent(inout) :: table
-    integer, intent(in) :: line, n, first(:), final(:)
-    type(problems_t), intent(inout) :: problems
-    integer :: width
-
-    width = size(table%name)
-    if (n /= width) then
-      call problems%add_message('line '//to_text(line)//', column '//to_text(min(n, width) + 1) &
-        //': '//to_text(n)//trim(merge(' cell ', ' cells', n == 1)) &
-        //', but the table has '//to_text(width)//' columns')
-      return
-    end if
-    table%n_rows = table%n_rows + 1
-    table%line(table%n_rows) = line
-    table%first(:, table%n_rows) = first(:width)
-    table%last(:, table%n_rows) = final(:width)
-  end subroutine add_row
 
   !> A cell without the quotes around it.
   pure function plain(raw) result(text)

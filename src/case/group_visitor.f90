@@ -10,12 +10,12 @@
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use allowed_values_m, only: allowed_t, entry_t, words_of, choices
+  use allowed_values_m, only: allowed_t, entry_t, choices
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
     edit_distance, quoted_text, printable, sanitise, value_ok, value_not_finite, value_too_large, &
-    value_not_whole, value_malformed, lower_case
+    value_not_whole, value_malformed, lower_case, words_of
   implicit none
   private
   public :: group_visitor_t
@@ -276,8 +276,7 @@ contains
       if (len(problem) > 0) call self%fault(i, problem)
       if (self%good(variable)) x = values
     end if
-    self%entry(self%n)%text = to_text(pack(x, is_given(x)))
-    if (allowed%whole) self%entry(self%n)%text = to_text(nint(pack(x, is_given(x))))
+    self%entry(self%n)%number = pack(x, is_given(x))
   end subroutine real_values
 
   !> A logical; its example is what it is not by default.

@@ -32,7 +32,7 @@ contains
     type(csv_table_t) :: table
     real(wp), allocatable :: time(:), x(:, :), q(:, :)
     real(wp) :: place(3), attitude(4), v(3), omega(3)
-    logical :: turns
+    logical :: turns   ! the table has attitudes
     integer :: b, i
 
     do b = 1, size(case%body)
@@ -45,7 +45,7 @@ contains
           turns = any([(table%column(columns(i)) > 0, i=n_required + 1, size(columns))])
           if (turns .and. body%attitude_given) call found%add_message('has an attitude, and so ' &
             //'has the &body; give one only')
-          if (found%n == 0) call read_rows(table, turns, body%quaternion, time, x, q, found)
+          if (found%n == 0) call read_rows(body%quaternion)
         end if
         call table%warn_of_remarks('&body motion = '//quoted_text(body%motion), body%line, warnings)
         do i = 1, found%n
@@ -68,54 +68,51 @@ contains
         body%quaternion = attitude
       end associate
     end do
+  contains
+    !> The rows of a table, with every problem of any of its cells.
+    subroutine read_rows(attitude)
+      real(wp), intent(in) :: attitude(4)   !! that of all rows if the table has none
+      real(wp) :: row(8), angle
+      logical :: ok
+      integer :: r, c, last
+
+      if (allocated(time)) deallocate (time, x, q)
+      allocate (time(table%n_rows), x(3, table%n_rows), q(4, table%n_rows), source=0.0_wp)
+      if (table%n_rows == 0) call found%add_message('has no rows')
+      if (turns) then
+        do c = n_required + 1, size(columns)
+          if (table%column(columns(c)) == 0) call found%add_message('missing: ' &
+            //trim(columns(c))//'; give all four of qw, qx, qy, qz or none')
+        end do
+      end if
+      last = 0
+      do r = 1, table%n_rows
+        row = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, attitude]
+        ok = .true.
+        do c = 1, merge(size(columns), n_required, turns)
+          call table%number(r, table%column(columns(c)), .true., row(c), ok, found)
+        end do
+        if (.not. ok) cycle
+        time(r) = row(1)
+        x(:, r) = row(2:4)
+        q(:, r) = row(5:8)
+        if (.not. norm(q(:, r)) > 0.0_wp) then
+          call table%report(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', found)
+          cycle
+        end if
+        q(:, r) = normalised(q(:, r))
+        if (last > 0) then
+          if (.not. time(r) > time(last)) call table%report(r, table%column('time'), &
+            'must be later than '//to_text(time(last))//' on line '//to_text(table%line(last)), &
+            found)
+          angle = 2.0_wp*acos(min(1.0_wp, abs(dot_product(q(:, r), q(:, last)))))*180.0_wp/pi
+          if (angle > largest_turn) call table%report(r, table%column('qw'), 'turns by ' &
+            //brief(angle, 3)//' degrees since line '//to_text(table%line(last)) &
+            //', which leaves open which way; at most '//to_text(largest_turn), found)
+        end if
+        last = r
+      end do
+    end subroutine read_rows
   end subroutine read_motions
-
-  !> The rows of a table, with every problem of any of its cells.
-  subroutine read_rows(table, turns, attitude, time, x, q, problems)
-    type(csv_table_t), intent(in) :: table
-    logical, intent(in) :: turns             !! the table has attitudes
-    real(wp), intent(in) :: attitude(4)      !! that of all rows if it has not
-    real(wp), allocatable, intent(out) :: time(:), x(:, :), q(:, :)
-    type(problems_t), intent(inout) :: problems
-    real(wp) :: row(8), angle
-    logical :: ok
-    integer :: r, c, last
-
-    allocate (time(table%n_rows), x(3, table%n_rows), q(4, table%n_rows), source=0.0_wp)
-    if (table%n_rows == 0) call problems%add_message('has no rows')
-    if (turns) then
-      do c = n_required + 1, size(columns)
-        if (table%column(columns(c)) == 0) call problems%add_message('missing: ' &
-          //trim(columns(c))//'; give all four of qw, qx, qy, qz or none')
-      end do
-    end if
-    last = 0
-    do r = 1, table%n_rows
-      row = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, attitude]
-      ok = .true.
-      do c = 1, merge(size(columns), n_required, turns)
-        call table%number(r, table%column(columns(c)), .true., row(c), ok, problems)
-      end do
-      if (.not. ok) cycle
-      time(r) = row(1)
-      x(:, r) = row(2:4)
-      q(:, r) = row(5:8)
-      if (.not. norm(q(:, r)) > 0.0_wp) then
-        call table%report(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', problems)
-        cycle
-      end if
-      q(:, r) = normalised(q(:, r))
-      if (last > 0) then
-        if (.not. time(r) > time(last)) call table%report(r, table%column('time'), &
-          'must be later than '//to_text(time(last))//' on line '//to_text(table%line(last)), &
-          problems)
-        angle = 2.0_wp*acos(min(1.0_wp, abs(dot_product(q(:, r), q(:, last)))))*180.0_wp/pi
-        if (angle > largest_turn) call table%report(r, table%column('qw'), 'turns by ' &
-          //brief(angle, 3)//' degrees since line '//to_text(table%line(last)) &
-          //', which leaves open which way; at most '//to_text(largest_turn), problems)
-      end if
-      last = r
-    end do
-  end subroutine read_rows
 
 end module motion_file_m

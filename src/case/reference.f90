@@ -6,12 +6,12 @@
 !! it, and `tools/write_reference.py` makes the page docs/reference.md of both.
 module reference_m
   use kinds_m, only: name_length
-  use allowed_values_m, only: entry_t, choices, words_of
+  use allowed_values_m, only: entry_t, choices
   use group_visitor_m, only: group_visitor_t
   use string_builder_m, only: string_builder_t
   use case_input_m, only: group_names, first_repeated, list_entries
   use errors_m, only: problems_t, to_text
-  use value_text_m, only: lower_case, nearest_name, printable
+  use value_text_m, only: lower_case, nearest_name, printable, words_of
   implicit none
   private
   public :: reference_text
@@ -67,8 +67,8 @@ contains
     indent = maxval(len_trim(v%entry(:v%n)%name)) + 4
     do i = 1, v%n
       associate (entry => v%entry(i))
-        default = 'default '//entry%text
-        if (len(entry%text) == 0) default = 'no default'
+        default = 'default '//entry%value()
+        if (len(entry%value()) == 0) default = 'no default'
         if (entry%required) default = 'required'
         call lines%add_line('')
         call lines%add_line('  '//entry%name(:indent - 2) &
@@ -167,8 +167,8 @@ contains
         if (entry%allowed%unit /= '') rules = rules//', "unit": "'//trim(entry%allowed%unit)//'"'
         if (entry%required) then
           needed = needed//' '//trim(entry%name)
-        else if (len(entry%text) > 0) then
-          rules = rules//', "default": '//json(entry%text, entry%most > 1)
+        else if (len(entry%value()) > 0) then
+          rules = rules//', "default": '//json(entry%value(), entry%most > 1)
         end if
         rules = rules//', "examples": ['//json(entry%example(index(entry%example, ' = ', &
           back=.true.) + 3:), entry%most > 1)//']}'

@@ -137,8 +137,8 @@ contains
     do d = 1, 3
       do s = 1, 2
         if (.not. (v%good(side_name(s, d)) .and. v%good(side_name(s, d)//'_velocity'))) cycle
-        call require_side_velocity(v, side_name(s, d)//'_velocity', trim(boundary%kind(s, d)), &
-                                   boundary%velocity(:, s, d), s, d)
+        call require_side_velocity(side_name(s, d)//'_velocity', trim(boundary%kind(s, d)), &
+                                   boundary%velocity(:, s, d))
       end do
     end do
     do d = 1, 3
@@ -146,6 +146,24 @@ contains
         call v%judge(side_name(s, d), boundary%faulty(s, d))
       end do
     end do
+  contains
+    !> A wall moves in its own plane, an inflow enters the tank, the other sides have no velocity.
+    subroutine require_side_velocity(variable, kind, velocity)
+      character(*), intent(in) :: variable, kind
+      real(wp), intent(in) :: velocity(3)   !! [m/s]
+      character(8), parameter :: sign_word(2) = ['positive', 'negative']
+
+      if (is_wall(side_code(kind))) then
+        call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own ' &
+                       //'plane, the '//axis(d)//' component must be 0')
+      else if (gives_velocity(side_code(kind))) then
+        call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must enter ' &
+                       //'the tank, the '//axis(d)//' component must be '//sign_word(s))
+      else
+        call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows have ' &
+                       //'a velocity, not a side that is '//quoted_text(kind))
+      end if
+    end subroutine require_side_velocity
   end subroutine visit_boundary
 
   !> A side of the tank in words.
@@ -156,26 +174,6 @@ contains
     meaning = 'the side of lowest '//axis(d)
     if (s == 2) meaning = 'the side of highest '//axis(d)
   end function side_meaning
-
-  !> A wall moves in its own plane, an inflow enters the tank, the other sides have no velocity.
-  subroutine require_side_velocity(v, variable, kind, velocity, s, d)
-    type(group_visitor_t), intent(inout) :: v
-    character(*), intent(in) :: variable, kind
-    real(wp), intent(in) :: velocity(3)   !! [m/s]
-    integer, intent(in) :: s, d           !! 1 lower or 2 upper side; direction
-    character(8), parameter :: sign_word(2) = ['positive', 'negative']
-
-    if (is_wall(side_code(kind))) then
-      call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own plane, ' &
-                     //'the '//axis(d)//' component must be 0')
-    else if (gives_velocity(side_code(kind))) then
-      call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must enter the ' &
-                     //'tank, the '//axis(d)//' component must be '//sign_word(s))
-    else
-      call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows have a ' &
-                     //'velocity, not a side that is '//quoted_text(kind))
-    end if
-  end subroutine require_side_velocity
 
   !> Name of a side of the tank: `x_min`, `x_max`, `y_min`, ...
   pure function side_name(s, d) result(name)
