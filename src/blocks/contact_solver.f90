@@ -45,12 +45,13 @@ module contact_solver_m
   end type met_t
 
   type, abstract :: contact_solver_t
-    logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
+    !> The exact surfaces touch, not contact spheres, and what is remembered has the forces, too, with
+    !! which a solution begins.
+    logical :: exact = .false.
     type(counterparts_t) :: counterparts
     type(contact_points_t) :: points             !! what touches now
     type(acting_t) :: acting
     type(displacements_t) :: displacements       !! the memory: part of the state of a run
-    logical :: warm_start = .false.              !! it has the forces too: a solution begins there
     type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
     type(lubrication_t) :: lubrication
     real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]

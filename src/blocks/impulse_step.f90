@@ -57,7 +57,6 @@ contains
     call contact_surface_init(input%contact_time, blocks, contacts%surface)
     call start_solver(input, blocks, contacts%surface%bounding_radius, contacts)
     contacts%exact = .true.
-    contacts%warm_start = .true.
     call rows_init(input, blocks%n, contacts%rows)
     allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
     contacts%contact_time = input%contact_time

@@ -102,7 +102,7 @@ contains
       call list%add('/light/wet', 'm3', state%light%wet)
       call list%add('/light/force', 'N, N m', state%light%force)
     end if
-    associate (contacts => state%contacts, warm => state%contacts%warm_start)
+    associate (contacts => state%contacts, warm => state%contacts%exact)
       call list_displacements('/contacts/', warm, warm, contacts%displacements, list)
       call list%add('/contacts/quiet', 's', contacts%sleep%quiet)
       call list_displacements('/contacts/rest_', .true., warm, contacts%sleep%frozen, list)

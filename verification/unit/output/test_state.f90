@@ -223,6 +223,7 @@ contains
     s%a = [2, 2, 3, 3]
     s%b = [1, -1, 1, 2]
     s%id = [7, 8, 9, 10]
+    s%other = [0, 11, 12, 0]
     s%k = [(start + 0.1_wp*i, i=1, 4)]
     s%energy = 3*s%k
     s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
