@@ -6,8 +6,8 @@
 !! points that carry it. Spheres touch as spheres, wherever a place is nearer than all around it.
 !!
 !! Pairs of bodies keep a list of the features that may touch until they have moved against one
-!! another by a skin (`near_features_m`), and a short one of those that may touch soon
-!! (`short_list_m`). What comes out, and its order, do not depend on when the lists were made.
+!! another by a skin (`near_features_m`). What comes out, and its order, do not depend on when the
+!! lists were made.
 !!
 !! Of what comes near, only what does so by its own motion counts as a contact point to come.
 module contact_surface_m
@@ -24,8 +24,7 @@ module contact_surface_m
   use surface_search_m, only: surface_t, nearest_on_surface, nearest_places
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges
   use near_features_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes, &
-    near_features_t, search_t, list_features, list_bed, edge_in_view
-  use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
+    near_features_t, near_vertices_t, search_t, list_features, list_bed, edge_in_view
   implicit none
   private
   public :: contact_surface_t, contact_surface_init, find_surface_points, cover_way, renew_pairs
@@ -35,7 +34,6 @@ module contact_surface_m
     integer :: a = 0, b = 0
     real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
     type(near_features_t), allocatable :: near   !! before they have moved by a skin
-    type(short_list_t), allocatable :: close     !! before they have moved a little
   end type pair_t
 
   type :: contact_surface_t
@@ -91,7 +89,7 @@ contains
       smallest = min(smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
       self%with_bed(b)%b = bed_counterpart
-      allocate (self%with_bed(b)%near, self%with_bed(b)%close)
+      allocate (self%with_bed(b)%near)
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*smallest
@@ -213,9 +211,8 @@ contains
       end associate
       if (same) then
         call move_alloc(before(m)%near, self%pairs(p)%near)
-        call move_alloc(before(m)%close, self%pairs(p)%close)
       else
-        allocate (self%pairs(p)%near, self%pairs(p)%close)
+        allocate (self%pairs(p)%near)
       end if
     end do
     self%listed = .true.
@@ -269,8 +266,10 @@ contains
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(meeting_t) :: now
-    logical :: holds, ended
+    logical :: ended
 
+    now%a = a
+    now%b = bed_counterpart
     now%poses%x_a = bed_place(bed, blocks%x(:, a))
     now%poses%q_a = blocks%q(:, a)
     now%turn_a = self%turn(:, :, a)
@@ -283,11 +282,11 @@ contains
     now%ahead = ahead
     now%margin = self%search%margin
     associate (surface => self%surface(blocks%shape(a)), pair => self%with_bed(a))
-      call check_lists(now, surface, bed%surface, pair, self%search, holds, ended)
-      if (holds .and. n_chosen(pair%close) == 0) return
+      call check_lists(surface, bed%surface, pair%near, self%search, now, ended)
+      if (.not. ended .and. now%way + now%gap < pair%near%nearest) return
       call update_views(now)
       if (ended) call list_bed(bed, now, surface, self%search, pair%near)
-      call add_feature_points(holds, surface, bed%surface, self%search, now, pair, points)
+      call add_feature_points(surface, bed%surface, now, pair%near, points)
     end associate
   end subroutine add_bed_points
 
@@ -301,10 +300,12 @@ contains
     type(meeting_t) :: now
     real(wp) :: apart, depth, normal(3), arm(3)
     integer :: a, b
-    logical :: holds, ended
+    logical :: ended
 
     a = self%pairs(p)%a
     b = self%pairs(p)%b
+    now%a = a
+    now%b = b
     now%poses = poses_t(blocks%x(:, a), blocks%x(:, b), blocks%q(:, a), blocks%q(:, b))
     now%turn_a = self%turn(:, :, a)
     now%turn_b = self%turn(:, :, b)
@@ -329,103 +330,85 @@ contains
         call add_point(contact_point_t(a, b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
           min(surface_a%length, surface_b%length)), points)
       else
-        call check_lists(now, surface_a, surface_b, self%pairs(p), self%search, holds, ended)
-        if (holds .and. n_chosen(self%pairs(p)%close) == 0) return
+        call check_lists(surface_a, surface_b, self%pairs(p)%near, self%search, now, ended)
+        if (.not. ended .and. now%way + now%gap < self%pairs(p)%near%nearest) return
         call update_views(now)
         if (ended) call list_features(now, surface_a, surface_b, self%search, self%pairs(p)%near)
-        call add_feature_points(holds, surface_a, surface_b, self%search, now, self%pairs(p), &
-          points)
+        call add_feature_points(surface_a, surface_b, now, self%pairs(p)%near, points)
       end if
     end associate
   end subroutine add_pair_points
 
-  !> Does the short list of a pair hold? If not, do the lists that it comes from, or how far must
-  !! new ones look?
-  pure subroutine check_lists(now, surface_a, surface_b, pair, search, holds, ended)
-    type(meeting_t), intent(in) :: now
+  !> How far a pair has moved since its lists were made. Do they hold no longer, and how far must new
+  !! ones look?
+  pure subroutine check_lists(surface_a, surface_b, near, search, now, ended)
     type(surface_t), intent(in) :: surface_a, surface_b
-    type(pair_t), intent(in) :: pair
+    type(near_features_t), intent(in) :: near
     type(search_t), intent(inout) :: search
-    logical, intent(out) :: holds             !! the short list
-    logical, intent(out) :: ended             !! the others do not
+    type(meeting_t), intent(inout) :: now
+    logical, intent(out) :: ended
     real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
 
-    ended = .false.
-    holds = short_list_holds(now, surface_a%bounding_radius, surface_b%bounding_radius, pair%close)
-    if (holds) return
-    ended = now%gap > pair%near%ahead .or. way_between(pair%near%when, now%poses, &
-      surface_a%bounding_radius, surface_b%bounding_radius) > pair%near%valid
-    if (ended) search%ahead = max(search%min_ahead, wider*now%gap)
+    now%way = way_between(near%when, now%poses, surface_a%bounding_radius, &
+      surface_b%bounding_radius)
+    ended = now%gap > near%ahead .or. now%way > near%valid
+    if (.not. ended) return
+    now%way = 0.0_wp
+    search%ahead = max(search%min_ahead, wider*now%gap)
   end subroutine check_lists
 
   !> Contact points of a pair of bodies, or of body a and the bed: vertices of b, vertices of a,
-  !! crossing edges. They come from the short list of the pair, which is renewed where it no longer
-  !! holds.
-  subroutine add_feature_points(holds, surface_a, surface_b, search, now, pair, points)
-    logical, intent(in) :: holds              !! the short list
+  !! crossing edges.
+  subroutine add_feature_points(surface_a, surface_b, now, near, points)
     type(surface_t), intent(in) :: surface_a, surface_b
-    type(search_t), intent(in) :: search
     type(meeting_t), intent(in) :: now
-    type(pair_t), intent(inout) :: pair
+    type(near_features_t), intent(in) :: near
     type(contact_points_t), intent(inout) :: points
-    real(wp) :: way
 
-    if (.not. holds) then
-      way = way_between(pair%near%when, now%poses, surface_a%bounding_radius, &
-        surface_b%bounding_radius)
-      call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
-      if (n_chosen(pair%close) == 0) return
-    end if
-    call add_vertex_points(.false., now, surface_b, surface_a, pair, points)
-    call add_vertex_points(.true., now, surface_a, surface_b, pair, points)
-    call add_edge_points(now, surface_a, surface_b, pair, points)
+    call add_vertex_points(.false., now, surface_b, surface_a, near%of_b, points)
+    call add_vertex_points(.true., now, surface_a, surface_b, near%of_a, points)
+    call add_edge_points(now, surface_a, surface_b, near, points)
   end subroutine add_feature_points
 
-  !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
-  !! (the host).
+  !> Contact points of the vertices listed of one body (the guest) with the surface of the other (the
+  !! host).
   !!
   !! A point inside a flat face of the guest may come only to a surface that the face
   !! looks at: else, level with the edge of a face ahead, it would hold a body that slides over it.
-  subroutine add_vertex_points(guest_is_a, now, guest, host, pair, points)
+  subroutine add_vertex_points(guest_is_a, now, guest, host, list, points)
     logical, intent(in) :: guest_is_a
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: guest, host
-    type(pair_t), intent(in) :: pair
+    type(near_vertices_t), intent(in) :: list
     type(contact_points_t), intent(inout) :: points
     real(wp), parameter :: max_cosine = -0.2_wp   !! of a face and the surface that it looks at [-]
     type(view_t) :: view                      ! of the guest, host axes
     type(contact_point_t) :: point
     real(wp) :: turn_host(3, 3), place(3), apart, outward(3)
-    integer :: c, m, n, i, edges, next
+    integer :: m, i
 
-    point%a = pair%a
-    point%b = pair%b
+    point%a = now%a
+    point%b = now%b
     point%length = min(guest%length, host%length)
     if (guest_is_a) then
       view = now%a_in_b
       turn_host = now%turn_b
-      n = pair%close%n_of_a
-      next = pair%close%of_a
     else
       view = now%b_in_a
       turn_host = now%turn_a
-      n = pair%close%n_of_b
-      next = 1
     end if
-    do c = 1, n
-      associate (list => pair%close%item)
-        m = next
-        i = list(m)
-        edges = m + 3 + list(m + 1)
-        next = edges + list(m + 2)
-        place = view%x + view%turn(:, 1)*guest%vertex(1, i) + view%turn(:, 2)*guest%vertex(2, i) &
-          + view%turn(:, 3)*guest%vertex(3, i)
+    do m = 1, list%n
+      if (list%away(m) > now%way + now%gap) cycle
+      i = list%vertex(m)
+      place = view%x + view%turn(:, 1)*guest%vertex(1, i) + view%turn(:, 2)*guest%vertex(2, i) &
+        + view%turn(:, 3)*guest%vertex(3, i)
+      associate (facets => list%facet(list%facet_first(m):list%facet_first(m + 1) - 1), &
+        edges => list%edge(list%edge_first(m):list%edge_first(m + 1) - 1))
         if (guest%ball > 0.0_wp) then
-          call add_ball_points(list(m + 3:edges - 1), list(edges:next - 1))
+          call add_ball_points(facets, edges)
           cycle
         end if
-        call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
-          apart, outward)
+        call nearest_on_surface(host, place, facets, edges, apart, outward)
       end associate
       if (apart >= now%gap) cycle
       if (i > guest%n_corners) then
@@ -481,11 +464,11 @@ contains
 
   end subroutine add_vertex_points
 
-  !> Contact points of the chosen pairs of edges that cross.
-  subroutine add_edge_points(now, surface_a, surface_b, pair, points)
+  !> Contact points of the pairs of edges listed that cross.
+  subroutine add_edge_points(now, surface_a, surface_b, near, points)
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
-    type(pair_t), intent(in) :: pair
+    type(near_features_t), intent(in) :: near
     type(contact_points_t), intent(inout) :: points
     type(edge_t) :: guest
     type(crossing_t) :: crossing
@@ -494,12 +477,13 @@ contains
     integer :: m, i, j, last
 
     last = 0
-    do m = pair%close%edges, pair%close%edges + 2*pair%close%n_edges - 1, 2
-      i = pair%close%item(m)
-      j = pair%close%item(m + 1)
+    do m = 1, near%n_crossings
+      if (near%away(m) > now%way + now%gap) cycle
+      i = near%edge_a(m)
+      j = near%edge_b(m)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      point = contact_point_t(a=pair%a, b=pair%b, id=size(surface_a%weight) + i, &
+      point = contact_point_t(a=now%a, b=now%b, id=size(surface_a%weight) + i, &
         other=surface_b%edge_number(j), length=min(surface_a%length, surface_b%length))
       call cross_edges(guest, surface_b%edge(j), -now%gap, point%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle

@@ -30,7 +30,9 @@ module near_features_m
 
   !> Bodies a and b, or body a and the bed, at one moment.
   type :: meeting_t
+    integer :: a = 0, b = 0                      !! their numbers
     type(poses_t) :: poses
+    real(wp) :: way = 0.0_wp                     !! since their lists were made [m]
     real(wp) :: turn_a(3, 3) = 0.0_wp, turn_b(3, 3) = 0.0_wp   !! body axes to space
     real(wp) :: to_b(3) = 0.0_wp       !! from the centre of a to that of b, space [m]
     real(wp) :: speed = 0.0_wp         !! of any two points against one another, at most [m/s]
@@ -57,6 +59,7 @@ module near_features_m
     type(poses_t) :: when                        !! poses at which they were made
     real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
     real(wp) :: ahead = 0.0_wp                   !! largest gap for which they hold [m]
+    real(wp) :: nearest = nowhere                !! way and gap before anything touches [m]
     type(near_vertices_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
@@ -97,6 +100,7 @@ contains
     call list_vertices(now%b_in_a, now%a_in_b, skin, b, a, search, near%of_b)
     call list_vertices(now%a_in_b, now%b_in_a, skin, a, b, search, near%of_a)
     call list_crossings(now, a, b, search, near)
+    call find_nearest(near)
   end subroutine list_features
 
   !> Lists of a body and the bed.
@@ -140,6 +144,7 @@ contains
       near%of_a%away(near%of_a%n) = distance - surface%ball
     end do
     call end_lists(near%of_a)
+    call find_nearest(near)
   end subroutine list_bed
 
   !> Empty lists for the present poses.
@@ -153,7 +158,17 @@ contains
     near%of_a%n = 0
     near%of_b%n = 0
     near%n_crossings = 0
+    near%nearest = nowhere
   end subroutine begin_lists
+
+  !> Way and gap before anything of the lists touches.
+  pure subroutine find_nearest(near)
+    type(near_features_t), intent(inout) :: near
+
+    if (near%of_a%n > 0) near%nearest = minval(near%of_a%away(:near%of_a%n))
+    if (near%of_b%n > 0) near%nearest = min(near%nearest, minval(near%of_b%away(:near%of_b%n)))
+    if (near%n_crossings > 0) near%nearest = min(near%nearest, minval(near%away(:near%n_crossings)))
+  end subroutine find_nearest
 
   !> Way by which bodies may move before their lists are renewed: wider for fast bodies [m].
   pure function skin_for(speed, search) result(skin)
