@@ -3,7 +3,7 @@ module contact_forces_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
-  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use contact_points_m, only: contact_points_t, groups_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use counterparts_m, only: counterparts_t, motion_t, wrench_t, motion_between, &
@@ -75,8 +75,7 @@ contains
     integer :: g
 
     do g = 1, groups%n
-      if (begins_pair(displacements, g)) motion = motion_between(counterparts, displacements%a(g), &
-                                                                 displacements%b(g))
+      motion = motion_between(counterparts, displacements%a(g), displacements%b(g))
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       displacements%xi(:, g) = displacements%xi(:, g) &
         + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))

@@ -9,7 +9,7 @@ module contact_law_m
   implicit none
   private
   public :: contact_law_t, stiffness_t
-  public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip, power
+  public :: stored_energy, normal_force, tangential_force, tangential_slip, power
 
   !> A contact law. Forces are those of springs k d^gamma, along the normal (n) and across (t).
   type, abstract :: contact_law_t
@@ -100,14 +100,6 @@ contains
     eta = law%eta_t
     if (law%tangential_share > 0.0_wp) eta = eta_n*(k_t/k_n)
   end function tangential_damping
-
-  !> Energy stored in a spring k d^gamma that pushes with a force: force d/(gamma + 1) [J].
-  elemental function energy_of_force(force, gamma, d) result(energy)
-    real(wp), intent(in) :: force, gamma, d   !! [N, -, m]
-    real(wp) :: energy
-
-    energy = force*d/(gamma + 1.0_wp)
-  end function energy_of_force
 
   !> Energy stored in a spring k d^gamma [J].
   elemental function stored_energy(k, gamma, d) result(energy)

@@ -4,7 +4,7 @@ module displacements_m
   use growing_m, only: ensure_capacity
   implicit none
   private
-  public :: displacements_t, reserve_displacements, comes_before, begins_pair, move_displacements
+  public :: displacements_t, reserve_displacements, comes_before, move_displacements
 
   !> Tangential displacements, one for each sphere or point (id) of a body and the counterpart it
   !! touches; arrays side by side, as the state of a run is written.
@@ -56,17 +56,6 @@ contains
       yes = id1 < id2
     end if
   end function comes_before
-
-  !> Whether entry g is the first of its pair of counterparts.
-  pure function begins_pair(displacements, g) result(yes)
-    type(displacements_t), intent(in) :: displacements
-    integer, intent(in) :: g
-    logical :: yes
-
-    yes = g == 1
-    if (.not. yes) yes = displacements%a(g) /= displacements%a(g - 1) &
-      .or. displacements%b(g) /= displacements%b(g - 1)
-  end function begins_pair
 
   !> Move the chosen entries of a list to another; both stay sorted.
   subroutine move_displacements(chosen, from, to)

@@ -2,7 +2,7 @@
 module law_constants_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, stiffness_t, energy_of_force, power
+  use contact_law_m, only: contact_law_t, stiffness_t, power
   implicit none
   private
   public :: law_constants_t, law_constants
@@ -53,7 +53,7 @@ contains
     end if
     if (.not. d > 0.0_wp) return
     elastic%force = k*power(d, law%gamma_n)
-    elastic%energy = energy_of_force(elastic%force, law%gamma_n, d)
+    elastic%energy = elastic%force*d/(law%gamma_n + 1.0_wp)
   end subroutine normal_stiffness
 
   !> Each contact point damps by itself.

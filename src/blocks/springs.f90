@@ -40,8 +40,6 @@ module springs_m
     type(displacements_t) :: before              !! work: displacements of the substep before
     real(wp), allocatable :: support(:, :)
       !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
-    !> Where bodies were, and how they turned, when a substep began: (3, n), q (4, n).
-    real(wp), allocatable :: x(:, :), lost(:, :), q(:, :), l(:, :), omega(:, :)
     real(wp) :: substep = 0.0_wp                 !! with which `load_if_still` found forces [s]
   contains
     procedure, pass(contacts) :: init
@@ -58,7 +56,6 @@ contains
     type(contact_input_t), intent(in) :: input
     type(blocks_t), intent(in) :: blocks
     class(springs_t), intent(inout) :: contacts
-    integer :: n
 
     call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
     call start_solver(input, blocks, contacts%spheres%bounding_radius, contacts)
@@ -67,9 +64,7 @@ contains
     contacts%courant_max = input%courant_max
     if (is_given(input%substep_ratio)) contacts%substep_ratio = input%substep_ratio
     call reserve_displacements(1, contacts%before)
-    n = blocks%n
-    allocate (contacts%support(6, n), contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), &
-      contacts%omega(3, n), contacts%lost(3, n), source=0.0_wp)
+    allocate (contacts%support(6, blocks%n), source=0.0_wp)
   end subroutine init
 
   !> Find what touches at the present poses.
@@ -220,18 +215,15 @@ contains
     type(blocks_t), intent(inout) :: blocks
     real(wp), intent(out) :: dt_b         !! the substep [s]
     real(wp), parameter :: bearable = 1.3_wp   !! times the limit of stiffness: not worth going back
-    real(wp) :: longest, allowed, time
-    integer :: b
+    real(wp) :: longest, allowed, time, x(3, blocks%n), lost(3, blocks%n), q(4, blocks%n)
+    real(wp) :: l(3, blocks%n), omega(3, blocks%n)
 
     time = blocks%time
-    do b = 1, blocks%n
-      if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
-      contacts%x(:, b) = blocks%x(:, b)
-      contacts%lost(:, b) = blocks%lost(:, b)
-      contacts%q(:, b) = blocks%q(:, b)
-      contacts%l(:, b) = blocks%l(:, b)
-      contacts%omega(:, b) = blocks%omega(:, b)
-    end do
+    x = blocks%x
+    lost = blocks%lost
+    q = blocks%q
+    l = blocks%l
+    omega = blocks%omega
     longest = limit
     do
       dt_b = equal_substep(left, longest)
@@ -239,15 +231,12 @@ contains
       call find_springs(walls, blocks, 0.5_wp*dt_b, contacts)
       allowed = contacts%stiffness_limit
       if (.not. dt_b > bearable*min(allowed, longest)) exit
-      do b = 1, blocks%n
-        if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
-        blocks%x(:, b) = contacts%x(:, b)
-        blocks%lost(:, b) = contacts%lost(:, b)
-        blocks%q(:, b) = contacts%q(:, b)
-        blocks%l(:, b) = contacts%l(:, b)
-        blocks%omega(:, b) = contacts%omega(:, b)
-      end do
       blocks%time = time
+      blocks%x = x
+      blocks%lost = lost
+      blocks%q = q
+      blocks%l = l
+      blocks%omega = omega
       longest = allowed
     end do
   end subroutine drift_to_middle

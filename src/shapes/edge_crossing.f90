@@ -29,7 +29,7 @@ module edge_crossing_m
   real(wp), parameter :: min_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
   real(wp), parameter :: beside = 0.15_wp   !! sine of the angle by which n may leave a fan
   real(wp), parameter :: share = 1.0_wp    !! of the depth: width in which an end fades
-  real(wp), parameter :: min_weight = 1.0e-12_wp   !! what is below is nothing
+  real(wp), parameter :: min_weight = 0.02_wp      !! what is below is nothing
   real(wp), parameter :: min_share = 0.01_wp   !! of the edge: the least such width
 
 contains
@@ -68,7 +68,7 @@ contains
         *between_ends(t + cosine*(peak_s - s), host%extent, depth, sine), &
         between_ends(peak_t, host%extent, depth, sine) &
         *between_ends(s + cosine*(peak_t - t), guest%extent, depth, sine)]
-      crossing%weight = crossing%weight*either(ends)
+      crossing%weight = crossing%weight*(ends(1) + ends(2) - ends(1)*ends(2))   ! one of both
       if (crossing%weight < min_weight) crossing%weight = 0.0_wp
       crossing%depth = depth
       crossing%normal = n
@@ -138,14 +138,6 @@ contains
     part = part**2*(3.0_wp - 2*part)
   end function fade
 
-  !> One where one of two is one, zero where both are zero; smooth.
-  pure function either(parts) result(part)
-    real(wp), intent(in) :: parts(2)
-    real(wp) :: part
-
-    part = parts(1) + parts(2) - parts(1)*parts(2)
-  end function either
-
   !> From the place of an edge nearest to another to the place where it is deepest between the two
   !! facets of the other, over the depth [-].
   !!
@@ -164,24 +156,15 @@ contains
     if (abs(slope) > 0.0_wp) way = -dot_product(n, into(:, 1) - into(:, 2))/slope
   end function lean
 
-  !> One along an edge, falling to zero at its ends.
+  !> One along an edge, falling to zero at its ends. By a shift of the bodies the crossing runs along
+  !! the edge up to 1/sine times as far: the force that turns it back is no stiffer.
   pure function between_ends(place, extent, depth, sine) result(part)
     real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
     real(wp), intent(in) :: depth           !! [m]
     real(wp), intent(in) :: sine            !! of the angle between the edges
     real(wp) :: part
 
-    part = fade(min(place, extent - place)/fade_width(extent, depth, sine))
+    part = fade(min(place, extent - place)/(max(share*depth, min_share*extent)/sine))
   end function between_ends
-
-  !> Way in which the weight fades at an end of an edge [m]. By a shift of the bodies the crossing
-  !! runs along the edge up to 1/sine times as far: the force that turns it back is no stiffer.
-  pure function fade_width(extent, depth, sine) result(width)
-    real(wp), intent(in) :: extent, depth   !! [m]
-    real(wp), intent(in) :: sine
-    real(wp) :: width
-
-    width = max(share*depth, min_share*extent)/sine
-  end function fade_width
 
 end module edge_crossing_m

