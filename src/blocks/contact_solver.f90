@@ -45,8 +45,8 @@ module contact_solver_m
   end type met_t
 
   type, abstract :: contact_solver_t
-    !> The exact surfaces touch, not contact spheres, and what is remembered has the forces, too, with
-    !! which a solution begins.
+    !> The exact surfaces touch, not contact spheres, and what is remembered has the forces, too,
+    !! with which a solution begins.
     logical :: exact = .false.
     type(counterparts_t) :: counterparts
     type(contact_points_t) :: points             !! what touches now

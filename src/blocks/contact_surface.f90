@@ -339,8 +339,8 @@ contains
     end associate
   end subroutine add_pair_points
 
-  !> How far a pair has moved since its lists were made. Do they hold no longer, and how far must new
-  !! ones look?
+  !> How far a pair has moved since its lists were made. Do they hold no longer, and how far must
+  !! new ones look?
   pure subroutine check_lists(surface_a, surface_b, near, search, now, ended)
     type(surface_t), intent(in) :: surface_a, surface_b
     type(near_features_t), intent(in) :: near
@@ -370,8 +370,8 @@ contains
     call add_edge_points(now, surface_a, surface_b, near, points)
   end subroutine add_feature_points
 
-  !> Contact points of the vertices listed of one body (the guest) with the surface of the other (the
-  !! host).
+  !> Contact points of the vertices listed of one body (the guest) with the surface of the other
+  !! (the host).
   !!
   !! A point inside a flat face of the guest may come only to a surface that the face
   !! looks at: else, level with the edge of a face ahead, it would hold a body that slides over it.

@@ -156,8 +156,8 @@ contains
     if (abs(slope) > 0.0_wp) way = -dot_product(n, into(:, 1) - into(:, 2))/slope
   end function lean
 
-  !> One along an edge, falling to zero at its ends. By a shift of the bodies the crossing runs along
-  !! the edge up to 1/sine times as far: the force that turns it back is no stiffer.
+  !> One along an edge, falling to zero at its ends. By a shift of the bodies the crossing runs
+  !! along the edge up to 1/sine times as far: the force that turns it back is no stiffer.
   pure function between_ends(place, extent, depth, sine) result(part)
     real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
     real(wp), intent(in) :: depth           !! [m]
