@@ -108,6 +108,18 @@ def test_refused_results_stay_as_they_are(lost: str, tmp_path: Path) -> None:
     assert mics(tmp_path, case, "--restart", "mics-out/restart-b.h5") == (0, "")
 
 
+def test_a_restart_file_alone_goes_nowhere(tmp_path: Path) -> None:
+    """Its rows are in no folder: older results are not set aside for it, no folder is made."""
+    case = WET.format(t_end=0.02)
+    assert mics(tmp_path, case) == (0, "")
+    (tmp_path / "mics-out" / "restart-a.h5").rename(tmp_path / "alone.h5")
+    for folder in "mics-out", "new":
+        found = mics(tmp_path, case, "--restart", "alone.h5", "--output", folder)
+        why = "./run.h5: is missing; a restart file goes on with the run.h5 beside it"
+        assert found == (4, f"mics: {why}\n")
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"mics-out"}
+
+
 def test_rows_of_every_step_wanted_later(tmp_path: Path) -> None:
     """The first of them is of the first step, not of the time of the restart file."""
     case = WET.format(t_end=0.04).replace("&run", "&run history_interval = 0.04 ")

@@ -175,6 +175,10 @@ contains
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
+      if (is_root() .and. code == exit_ok .and. .not. exists(from//'/run.h5')) then
+        code = exit_files
+        message = from//'/run.h5: is missing; a restart file goes on with the run.h5 beside it'
+      end if
       call share_outcome(code, message)
       if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
       if (code == exit_ok .and. is_root()) then   ! the result files, all or none
