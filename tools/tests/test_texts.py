@@ -238,7 +238,6 @@ NO_CONSTANTS = {
     "shapes/shapes_builtin.f90": {"golden"},
     "shapes/contact_sphere_placement.f90": {"turn"},
     # a ratio of two constants of the page
-    "blocks/contact_response.f90": {"share"},
     # marks for "none"
     "shapes/surface_search.f90": {"nowhere"},
     "case/case_types.f90": {"absent"},
