@@ -60,7 +60,7 @@ def same(bed: Run, other: Run, checks: Checks) -> None:
         if bed.value("contact", "model") == "spheres":
             checks.below(f"{name}: places [m]", apart.max(), SAME)
             return
-        # an impact is solved up to .002 of its speed, of which friction makes .1 mm at most sideways
+        # an impact is solved up to .002 of its speed, .1 mm sideways at most
         checks.below(f"{name}: heights at rest [m]", apart[-1, :, 2].max(), 1e-9)
         checks.below(f"{name}: places at rest [m]", apart[-1].max(), 1e-4)
         return
