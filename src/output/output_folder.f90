@@ -157,7 +157,7 @@ contains
     character(:), allocatable, intent(out) :: message
     character(:), allocatable :: from
     integer(c_long) :: there(stat_size, 2)
-    logical :: same   ! folder
+    logical :: same, there_too   ! folder, its `run.h5`
     integer :: i, made
 
     code = exit_ok
@@ -175,7 +175,8 @@ contains
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
-      if (is_root() .and. code == exit_ok .and. .not. exists(from//'/run.h5')) then
+      if (is_root() .and. code == exit_ok) there_too = exists(from//'/run.h5')
+      if (is_root() .and. code == exit_ok .and. .not. there_too) then
         code = exit_files
         message = from//'/run.h5: is missing; a restart file goes on with the run.h5 beside it'
       end if
