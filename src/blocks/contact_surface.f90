@@ -29,7 +29,7 @@ module contact_surface_m
   private
   public :: contact_surface_t, contact_surface_init, find_surface_points, cover_way, renew_pairs
 
-  !> What may touch of a pair of bodies a > b, or of body a and the bed.
+  !> What may touch of a pair of bodies a > b.
   type :: pair_t
     integer :: a = 0, b = 0
     real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
@@ -45,7 +45,7 @@ module contact_surface_m
     real(wp) :: unlisted_gap = 0.0_wp            !! way of pairs that are not in it to touch [m]
     type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
     type(pair_t), allocatable :: pairs(:)        !! (near%n)
-    type(pair_t), allocatable :: with_bed(:)     !! (bodies) each with the bed
+    type(near_features_t), allocatable :: with_bed(:)   !! (bodies) each with the bed
     !> Bodies and places of the list of pairs.
     logical :: listed = .false.
     logical, allocatable :: present(:)
@@ -87,9 +87,6 @@ contains
     do b = 1, blocks%n
       self%bounding_radius(b) = self%surface(blocks%shape(b))%bounding_radius
       smallest = min(smallest, self%surface(blocks%shape(b))%length)
-      self%with_bed(b)%a = b
-      self%with_bed(b)%b = bed_counterpart
-      allocate (self%with_bed(b)%near)
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*smallest
@@ -281,12 +278,12 @@ contains
     now%gap = ahead*speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    associate (surface => self%surface(blocks%shape(a)), pair => self%with_bed(a))
-      call check_lists(surface, bed%surface, pair%near, self%search, now, ended)
-      if (.not. ended .and. now%way + now%gap < pair%near%nearest) return
+    associate (surface => self%surface(blocks%shape(a)), near => self%with_bed(a))
+      call check_lists(surface, bed%surface, near, self%search, now, ended)
+      if (.not. ended .and. now%way + now%gap < near%nearest) return
       call update_views(now)
-      if (ended) call list_bed(bed, now, surface, self%search, pair%near)
-      call add_feature_points(surface, bed%surface, now, pair%near, points)
+      if (ended) call list_bed(bed, now, surface, self%search, near)
+      call add_feature_points(surface, bed%surface, now, near, points)
     end associate
   end subroutine add_bed_points
 

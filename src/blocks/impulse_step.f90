@@ -38,7 +38,6 @@ module impulse_step_m
     type(rows_t) :: rows
     real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films of liquid [N]
     real(wp), allocatable :: gain(:)         !! (n) work: speed gained in free fall [m/s]
-    real(wp) :: contact_time = 0.0_wp        !! [s]
     real(wp) :: restitution = 0.0_wp         !! [-]
     real(wp) :: smallest_edge = 0.0_wp       !! of all blocks [m]
   contains
@@ -59,7 +58,6 @@ contains
     contacts%exact = .true.
     call rows_init(input, blocks%n, contacts%rows)
     allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
-    contacts%contact_time = input%contact_time
     contacts%restitution = input%restitution
     if (blocks%n > 0) contacts%smallest_edge &
       = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
@@ -85,7 +83,7 @@ contains
         return
       end if
       step = equal_substep(left, longest)
-      n = ceiling(step*real(n_sub_sweeps, wp)/contacts%contact_time*(1.0_wp - 1.0e-9_wp))
+      n = ceiling(step*real(n_sub_sweeps, wp)/contacts%rows%contact_time*(1.0_wp - 1.0e-9_wp))
       h = step/real(n, wp)
       do
         call solve_step(walls, gravity, h, n, step, contacts, blocks)
@@ -133,9 +131,9 @@ contains
     associate (s => contacts%surface)
       edge = contacts%smallest_edge
       longest = left
-      if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
+      if (contacts%lubrication%active) longest = min(left, contacts%rows%contact_time/film_steps)
       if (most*longest > free_way*maxval(s%bounding_radius)) longest = min(longest, &
-        max(contacts%contact_time, free_way*maxval(s%bounding_radius)/most))
+        max(contacts%rows%contact_time, free_way*maxval(s%bounding_radius)/most))
       call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
       call renew_pairs(walls, blocks, s)
       do b = 1, blocks%n
@@ -178,7 +176,7 @@ contains
 
       if (gap > closing*longest) return
       longest = min(longest, max(max(gap, 0.0_wp)/max(closing, tiny(closing)), &
-        min(contacts%contact_time, max_way*edge/max(closing, tiny(closing)))))
+        min(contacts%rows%contact_time, max_way*edge/max(closing, tiny(closing)))))
     end subroutine limit_by
   end subroutine longest_step
 
@@ -224,7 +222,7 @@ contains
           end associate
         end do
         asked = n
-        call solve_rows(h, max_opening*contacts%smallest_edge/contacts%contact_time, &
+        call solve_rows(h, max_opening*contacts%smallest_edge/contacts%rows%contact_time, &
           contacts%restitution, slow_hit*norm(gravity)*step, n, rows)
         if (n < asked) step = h*real(n, wp)   ! else rounding would leave a step of no length
       end if

@@ -157,7 +157,7 @@ contains
     character(:), allocatable, intent(out) :: message
     character(:), allocatable :: from
     integer(c_long) :: there(stat_size, 2)
-    logical :: same, there_too   ! folder, its `run.h5`
+    logical :: same   ! folder
     integer :: i, made
 
     code = exit_ok
@@ -175,10 +175,11 @@ contains
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
-      if (is_root() .and. code == exit_ok) there_too = exists(from//'/run.h5')
-      if (is_root() .and. code == exit_ok .and. .not. there_too) then
-        code = exit_files
-        message = from//'/run.h5: is missing; a restart file goes on with the run.h5 beside it'
+      if (is_root() .and. code == exit_ok) then
+        if (.not. exists(from//'/run.h5')) then
+          code = exit_files
+          message = from//'/run.h5: is missing; a restart file goes on with the run.h5 beside it'
+        end if
       end if
       call share_outcome(code, message)
       if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
