@@ -26,29 +26,22 @@ module contact_spheres_m
     real(wp) :: largest = 0.0_wp   !! largest radius [m]
   end type sphere_set_t
 
-  !> Pairs of spheres that may touch: entries first(p) : first(p+1)-1 belong to body pair p.
+  !> Spheres that may touch: entries first(p) : first(p+1)-1 belong to pair p.
   type :: candidates_t
     integer :: n_pairs = 0
     integer, allocatable :: a(:), b(:), first(:)   !! (pairs) bodies; b < 0: wall, bed
     real(wp), allocatable :: shift(:, :)           !! (3, pairs) to the image of b near a [m]
     integer :: n = 0
-    integer, allocatable :: i(:), j(:)             !! (n) slots of the sphere of a and of b
+    integer, allocatable :: i(:), j(:)             !! (n) spheres of a and of b; 0: wall, bed
   end type candidates_t
 
   type :: contact_spheres_t
     real(wp) :: skin = 0.0_wp                  !! pairs nearer than this are listed [m]
-    real(wp) :: unlisted_gap = 0.0_wp            !! way of pairs that are not listed to touch [m]
-    real(wp) :: valid_way = 0.0_wp              !! by which bodies may move before the next list [m]
+    real(wp) :: unlisted_gap = 0.0_wp          !! way of pairs that are not listed to touch [m]
+    real(wp) :: valid_way = 0.0_wp             !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
     real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
-    !> Spheres that may touch before the list is made anew, body by body.
-    integer, allocatable :: slot_of(:)         !! slot of a sphere of all bodies; 0: not listed
-    integer, allocatable :: offset(:)          !! (bodies) number of spheres of the bodies before
-    integer :: n_slots = 0
-    integer, allocatable :: body(:), sphere(:) !! (slots)
-    real(wp), allocatable :: centre(:, :)      !! (3, slots) in space [m]
-    real(wp), allocatable :: radius(:)         !! (slots) [m]
     type(candidates_t) :: list
     !> Poses at which the list was made.
     logical :: listed = .false.
@@ -78,17 +71,13 @@ contains
           self%set(s)%bins)
       end associate
     end do
-    allocate (self%bounding_radius(blocks%n), self%offset(blocks%n), self%present(blocks%n))
+    allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
     self%smallest = huge(1.0_wp)
-    s = 0
     do b = 1, blocks%n
       self%smallest = min(self%smallest, 2*minval(blocks%shapes(blocks%shape(b))%sphere_radius))
-      self%offset(b) = s
-      s = s + size(blocks%shapes(blocks%shape(b))%sphere_radius)
       self%bounding_radius(b) = self%set(blocks%shape(b))%bounding_radius
     end do
-    allocate (self%slot_of(s), source=0)
     if (blocks%n == 0) return
     self%valid_way = share*self%smallest
     self%unlisted_gap = courant_max*self%smallest
@@ -105,7 +94,7 @@ contains
     type(contact_points_t), intent(inout) :: points
     real(wp) :: v(3), speed
     logical :: holds
-    integer :: p, s, b
+    integer :: p, b
 
     holds = self%listed
     do b = 1, blocks%n
@@ -116,13 +105,6 @@ contains
         + 2*self%bounding_radius(b)*norm(blocks%q(:, b) - self%q(:, b)) > self%valid_way
     end do
     if (.not. holds) call make_list(walls, blocks, self)
-    do s = 1, self%n_slots
-      b = self%body(s)
-      associate (c => blocks%shapes(blocks%shape(b))%sphere_centre(:, self%sphere(s)), &
-        r => self%turn(:, :, b))
-        self%centre(:, s) = blocks%x(:, b) + r(:, 1)*c(1) + r(:, 2)*c(2) + r(:, 3)*c(3)
-      end associate
-    end do
     points%n = 0
     do p = 1, self%list%n_pairs
       associate (a => self%list%a(p), c => self%list%b(p))
@@ -136,13 +118,7 @@ contains
           speed = speed + norm(blocks%omega(:, c))*self%bounding_radius(c)
         end if
         speed = speed + norm(v)
-        if (c == bed_counterpart) then
-          call add_bed_points(walls%bed, blocks, self, p, ahead*speed, points)
-        else if (c < 0) then
-          call add_wall_points(walls, blocks, self, p, ahead*speed, points)
-        else
-          call add_body_points(blocks, self, p, ahead*speed, points)
-        end if
+        call add_points(walls, blocks, p, ahead*speed, self, points)
       end associate
     end do
   end subroutine find_sphere_points
@@ -154,10 +130,6 @@ contains
     type(contact_spheres_t), intent(inout) :: self
     integer :: a, p, w
 
-    do p = 1, self%n_slots
-      self%slot_of(self%offset(self%body(p)) + self%sphere(p)) = 0
-    end do
-    self%n_slots = 0
     self%list%n_pairs = 0
     self%list%n = 0
     call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%skin, &
@@ -206,7 +178,7 @@ contains
 
   !> Append a candidate to the last pair.
   subroutine add_candidate(i, j, list)
-    integer, intent(in) :: i, j   !! slots; j = 0 for a wall
+    integer, intent(in) :: i, j   !! spheres; j = 0 for a wall
     type(candidates_t), intent(inout) :: list
 
     list%n = list%n + 1
@@ -216,27 +188,6 @@ contains
     list%j(list%n) = j
   end subroutine add_candidate
 
-  !> Slot of a sphere; the sphere gets one if it has none.
-  subroutine take_slot(blocks, b, sphere, self, slot)
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: b, sphere
-    type(contact_spheres_t), intent(inout) :: self
-    integer, intent(out) :: slot
-
-    slot = self%slot_of(self%offset(b) + sphere)
-    if (slot > 0) return
-    self%n_slots = self%n_slots + 1
-    slot = self%n_slots
-    self%slot_of(self%offset(b) + sphere) = slot
-    call ensure_capacity(slot, self%body)
-    call ensure_capacity(slot, self%sphere)
-    call ensure_capacity(slot, self%centre)
-    call ensure_capacity(slot, self%radius)
-    self%body(slot) = b
-    self%sphere(slot) = sphere
-    self%radius(slot) = blocks%shapes(blocks%shape(b))%sphere_radius(sphere)
-  end subroutine take_slot
-
   !> Spheres of body a near wall w.
   subroutine list_wall(walls, blocks, a, w, self)
     type(walls_t), intent(in) :: walls
@@ -244,7 +195,7 @@ contains
     integer, intent(in) :: a, w
     type(contact_spheres_t), intent(inout) :: self
     real(wp) :: beyond, height, n(3)
-    integer :: i, slot
+    integer :: i
 
     beyond = dot_product(walls%normal(:, w), blocks%x(:, a)) - walls%offset(w) + self%skin
     if (beyond + self%bounding_radius(a) <= 0.0_wp) return
@@ -254,8 +205,7 @@ contains
       do i = 1, size(shape%sphere_radius)
         height = beyond + dot_product(n, shape%sphere_centre(:, i))
         if (height + shape%sphere_radius(i) <= 0.0_wp) cycle
-        call take_slot(blocks, a, i, self, slot)
-        call add_candidate(slot, 0, self%list)
+        call add_candidate(i, 0, self%list)
       end do
     end associate
   end subroutine list_wall
@@ -267,7 +217,7 @@ contains
     integer, intent(in) :: a
     type(contact_spheres_t), intent(inout) :: self
     real(wp) :: x(3), c(3), cutoff, distance, outward(3)
-    integer :: i, slot
+    integer :: i
 
     x = bed_place(bed, blocks%x(:, a))
     cutoff = self%bounding_radius(a) + self%skin
@@ -280,8 +230,7 @@ contains
         call bed_distance(bed, c, cutoff, cutoff + self%bounding_radius(a), self%found, distance, &
           outward)
         if (distance > cutoff) cycle
-        call take_slot(blocks, a, i, self, slot)
-        call add_candidate(slot, 0, self%list)
+        call add_candidate(i, 0, self%list)
       end do
     end associate
   end subroutine list_bed
@@ -317,7 +266,7 @@ contains
     real(wp), intent(in) :: c(3)   !! [m]
     type(contact_spheres_t), intent(inout) :: self
     real(wp) :: cutoff, d(3)
-    integer :: low(3), high(3), kx, ky, kz, bin, m, j, slot_i, slot_j
+    integer :: low(3), high(3), kx, ky, kz, bin, m, j
 
     associate (set => self%set(blocks%shape(b)), shape => blocks%shapes(blocks%shape(b)))
       cutoff = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
@@ -333,9 +282,7 @@ contains
               j = set%bins%item(m)
               d = shape%sphere_centre(:, j) - c
               if (dot_product(d, d) >= (cutoff + shape%sphere_radius(j))**2) cycle
-              call take_slot(blocks, a, i, self, slot_i)
-              call take_slot(blocks, b, j, self, slot_j)
-              call add_candidate(slot_i, slot_j, self%list)
+              call add_candidate(i, j, self%list)
             end do
           end do
         end do
@@ -343,95 +290,57 @@ contains
     end associate
   end subroutine list_sphere
 
-  !> Contact points of pair p, a body and a wall. The contact lies on the wall.
-  subroutine add_wall_points(walls, blocks, self, p, gap, points)
+  !> Contact points of pair p: on the wall, at the nearest place of the bed, or in the middle of the
+  !! overlap of two spheres.
+  subroutine add_points(walls, blocks, p, gap, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
-    type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
     real(wp), intent(in) :: gap   !! still taken as a contact point [m]
-    type(contact_points_t), intent(inout) :: points
-    type(contact_point_t) :: point
-    integer :: c, s, w
-
-    do w = 1, walls%n
-      if (walls%number(w) == self%list%b(p)) exit
-    end do
-    point%a = self%list%a(p)
-    point%b = self%list%b(p)
-    point%normal = walls%normal(:, w)
-    do c = self%list%first(p), self%list%first(p + 1) - 1
-      s = self%list%i(c)
-      point%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
-        + self%radius(s)
-      if (point%depth <= -gap) cycle
-      point%id = self%sphere(s)
-      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) &
-        + (self%radius(s) - point%depth)*walls%normal(:, w)
-      point%length = 2*self%radius(s)
-      call add_point(point, points)
-    end do
-  end subroutine add_wall_points
-
-  !> Contact points of pair p, a body and the bed, each sphere at the nearest place of the bed.
-  subroutine add_bed_points(bed, blocks, self, p, gap, points)
-    type(bed_t), intent(inout) :: bed
-    type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(inout) :: self
-    integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
     type(contact_points_t), intent(inout) :: points
     type(contact_point_t) :: point
-    real(wp) :: distance, outward(3)
-    integer :: c, s
+    real(wp) :: c(3), d(3), to_b(3), radius, distance, outward(3)
+    integer :: m, w
 
-    point%a = self%list%a(p)
-    point%b = bed_counterpart
-    do c = self%list%first(p), self%list%first(p + 1) - 1
-      s = self%list%i(c)
-      call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
-        2*self%radius(s) + gap, self%found, distance, outward)
-      if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
-      point%id = self%sphere(s)
-      point%normal = -outward
-      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) - distance*outward
-      point%depth = self%radius(s) - distance
-      point%length = 2*self%radius(s)
-      call add_point(point, points)
-    end do
-  end subroutine add_bed_points
-
-  !> Contact points of pair p of bodies. The contact lies in the middle of the overlap.
-  subroutine add_body_points(blocks, self, p, gap, points)
-    type(blocks_t), intent(in) :: blocks
-    type(contact_spheres_t), intent(in) :: self
-    integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
-    type(contact_points_t), intent(inout) :: points
-    type(contact_point_t) :: point
-    real(wp) :: d(3), shift(3), square, distance, sum_of_radii
-    integer :: c, i, j
-
-    point%a = self%list%a(p)
-    point%b = self%list%b(p)
-    shift = self%list%shift(:, p)
-    do c = self%list%first(p), self%list%first(p + 1) - 1
-      i = self%list%i(c)
-      j = self%list%j(c)
-      sum_of_radii = self%radius(i) + self%radius(j)
-      d = self%centre(:, j) + shift - self%centre(:, i)
-      square = dot_product(d, d)
-      if (square >= (sum_of_radii + gap)**2) cycle
-      distance = sqrt(square)
-      point%id = self%sphere(i)
-      point%normal = d/max(distance, tiny(1.0_wp))
-      point%depth = sum_of_radii - distance
-      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*point%depth)*point%normal
-      point%arm_a = d - blocks%x(:, point%a)
-      point%arm_b = d - (blocks%x(:, point%b) + shift)
-      point%length = 2*min(self%radius(i), self%radius(j))
-      call add_point(point, points)
-    end do
-  end subroutine add_body_points
+    associate (a => self%list%a(p), b => self%list%b(p))
+      point%a = a
+      point%b = b
+      to_b = 0.0_wp
+      if (b > 0) to_b = blocks%x(:, b) + self%list%shift(:, p) - blocks%x(:, a)
+      w = findloc(walls%number(:walls%n), b, 1)
+      do m = self%list%first(p), self%list%first(p + 1) - 1
+        point%id = self%list%i(m)
+        radius = blocks%shapes(blocks%shape(a))%sphere_radius(point%id)
+        c = matmul(self%turn(:, :, a), blocks%shapes(blocks%shape(a))%sphere_centre(:, point%id))
+        point%length = 2*radius
+        if (b == bed_counterpart) then
+          call bed_distance(walls%bed, bed_place(walls%bed, blocks%x(:, a) + c), radius + gap, &
+            2*radius + gap, self%found, distance, outward)
+          if (all(abs(outward) <= 0.0_wp)) cycle
+          point%normal = -outward
+          point%depth = radius - distance
+        else if (b < 0) then
+          point%normal = walls%normal(:, w)
+          distance = walls%offset(w) - dot_product(point%normal, blocks%x(:, a)) &
+            - dot_product(point%normal, c)
+          point%depth = radius - distance
+        else
+          associate (shape => blocks%shapes(blocks%shape(b)), j => self%list%j(m))
+            d = to_b + matmul(self%turn(:, :, b), shape%sphere_centre(:, j)) - c
+            distance = norm(d)
+            point%normal = d/max(distance, tiny(1.0_wp))
+            point%depth = radius + shape%sphere_radius(j) - distance
+            point%length = 2*min(radius, shape%sphere_radius(j))
+          end associate
+          distance = radius - 0.5_wp*point%depth
+        end if
+        if (point%depth <= -gap) cycle
+        point%arm_a = c + distance*point%normal   ! that of the contact
+        if (b > 0) point%arm_b = point%arm_a - to_b
+        call add_point(point, points)
+      end do
+    end associate
+  end subroutine add_points
 
 end module contact_spheres_m
