@@ -12,7 +12,7 @@ module contact_forces_m
   use contact_solver_m, only: loads_t, contact_report_t, energy_in_memory
   implicit none
   private
-  public :: match_displacements, integrate_displacements, sum_pairs, push_group, elastic_energy
+  public :: match_displacements, integrate_displacements, sum_groups, elastic_energy
 
   !> What the contact points of one group do along their normals.
   type :: push_t
@@ -82,11 +82,12 @@ contains
     end do
   end subroutine integrate_displacements
 
-  !> Contact forces and torques of this substep, added to those on the counterparts.
+  !> Contact forces and torques of this substep, added to those on the counterparts, and remembered
+  !! with their energy: by them blocks fall asleep, and are held then.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
-  pure subroutine sum_pairs(dt, points, response, counterparts, displacements, loads, report)
+  pure subroutine sum_groups(dt, points, response, counterparts, displacements, loads, report)
     real(wp), intent(in) :: dt   !! [s]
     type(contact_points_t), intent(in) :: points
     type(response_t), intent(in) :: response
@@ -98,7 +99,8 @@ contains
     integer :: g
 
     do g = 1, response%groups%n
-      associate (a => displacements%a(g), b => displacements%b(g))
+      associate (a => displacements%a(g), b => displacements%b(g), &
+        first => response%groups%first(g), last => response%groups%first(g + 1) - 1)
         wrench = wrench_t()
         call push_group(g, dt, motion_between(counterparts, a, b), points, response, &
           displacements, wrench, report)
@@ -106,9 +108,14 @@ contains
         loads%force(:, b) = loads%force(:, b) - wrench%force
         loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
         loads%torque(:, b) = loads%torque(:, b) + wrench%torque_b
+        displacements%force(:, g) = wrench%force
+        displacements%torque_a(:, g) = wrench%torque_a
+        displacements%torque_b(:, g) = wrench%torque_b
+        displacements%energy(g) = sum(response%energy(first:last)) &
+          + stored_energy(displacements%k(g), response%law%gamma_t, norm(displacements%xi(:, g)))
       end associate
     end do
-  end subroutine sum_pairs
+  end subroutine sum_groups
 
   !> Normal and tangential forces of one group.
   pure subroutine push_group(g, dt, motion, points, response, displacements, wrench, report)

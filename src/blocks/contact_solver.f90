@@ -8,7 +8,7 @@ module contact_solver_m
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
-  use sleep_m, only: sleep_t, sleep_init, sum_memory
+  use sleep_m, only: sleep_t, sleep_init
   use lubrication_m, only: lubrication_t
   use contact_points_m, only: contact_points_t, ensure_points
   use counterparts_m, only: counterparts_t, counterparts_init
@@ -45,9 +45,7 @@ module contact_solver_m
   end type met_t
 
   type, abstract :: contact_solver_t
-    !> The exact surfaces touch, not contact spheres, and what is remembered has the forces, too,
-    !! with which a solution begins.
-    logical :: exact = .false.
+    logical :: exact = .false.                   !! the surfaces touch, not contact spheres
     type(counterparts_t) :: counterparts
     type(contact_points_t) :: points             !! what touches now
     type(acting_t) :: acting
@@ -63,8 +61,6 @@ module contact_solver_m
     procedure(init_i), pass(contacts), deferred :: init
     procedure(advance_i), pass(contacts), deferred :: advance
     procedure, pass(contacts) :: detect => detect_in_steps
-    procedure, pass(contacts) :: load_if_still => load_of_memory
-    procedure, pass(contacts) :: store_forces => keep_forces
     procedure, pass(contacts) :: energy => energy_of_memory
   end type contact_solver_t
 
@@ -122,33 +118,6 @@ contains
     associate (unused => walls%n, unused_too => contacts%met%n, unused_as_well => blocks%n)
     end associate
   end subroutine detect_in_steps
-
-  !> Contact forces and torques of the coming step if the candidates for sleep begin it at rest: as
-  !! remembered.
-  subroutine load_of_memory(walls, gravity, dt, candidate, contacts, blocks)
-    type(walls_t), intent(in) :: walls
-    real(wp), intent(in) :: gravity(3), dt   !! [m/s2], fluid step [s]
-    logical, intent(in) :: candidate(:)      !! (n)
-    class(contact_solver_t), intent(inout) :: contacts
-    type(blocks_t), intent(in) :: blocks
-
-    associate (unused => walls%n, unused_too => gravity, unused_as_well => dt, &
-               unused_here => candidate, unused_there => blocks%n)
-    end associate
-    contacts%loads%force = 0.0_wp
-    contacts%loads%torque = 0.0_wp
-    call sum_memory(contacts%displacements, contacts%loads%force(:, 1:), &
-                    contacts%loads%torque(:, 1:))
-  end subroutine load_of_memory
-
-  !> Store the forces of chosen contact points, those of `load_if_still`: they are in memory.
-  subroutine keep_forces(chosen, contacts)
-    logical, intent(in) :: chosen(:)   !! (displacements)
-    class(contact_solver_t), intent(inout) :: contacts
-
-    associate (unused => chosen, unused_too => contacts%met%n)
-    end associate
-  end subroutine keep_forces
 
   !> Elastic energy of all contact points [J].
   pure function energy_of_memory(contacts) result(energy)

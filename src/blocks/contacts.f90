@@ -48,7 +48,7 @@ contains
     t_end = blocks%time + dt
     call begin(walls, gravity, dt, contacts, blocks)
     call contacts%detect(walls, blocks)
-    if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
+    if (contacts%sleep%active) call wake_or_sleep(walls, gravity, contacts, blocks)
     if (all_still(blocks)) then
       contacts%loads%impulse(:, 1:) = dt*contacts%sleep%load
       contacts%loads%twist(:, 1:) = dt*contacts%sleep%load_torque

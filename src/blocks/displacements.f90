@@ -18,8 +18,7 @@ module displacements_m
       !! (n) edge of b, of contact points solved for impulses
     real(wp), allocatable :: xi(:, :)            !! (3, n) way of the counterpart past the body [m]
     real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
-    !> Of contact points at rest (`sleep_m`) and of those solved for impulses: force on a, torques
-    !! on a and b, energy of the contact point.
+    !> Of the last substep: force on a, torques on a and b, energy of the contact point.
     real(wp), allocatable :: force(:, :), torque_a(:, :), torque_b(:, :)   !! (3, n) [N], [N m]
     real(wp), allocatable :: energy(:)           !! (n) [J]
   end type displacements_t

@@ -4,7 +4,7 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use displacements_m, only: move_displacements
-  use sleep_m, only: update_loads, may_sleep, balanced, rest_tolerance, wake_tolerance, &
+  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, rest_tolerance, wake_tolerance, &
     put_to_sleep, wake, all_still
   use counterparts_m, only: counterparts_t
   use contact_solver_m, only: contact_solver_t, list_bodies, store_counterparts
@@ -16,19 +16,18 @@ contains
 
   !> At the start of a step: wake those that the fluid has put out of balance where nothing moves
   !! (else they wake in the substeps), and let those sleep that are candidates and in balance.
-  subroutine wake_or_sleep(walls, gravity, dt, contacts, blocks)
+  subroutine wake_or_sleep(walls, gravity, contacts, blocks)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in) :: dt           !! fluid step [s]
     class(contact_solver_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     logical :: changed, candidate(blocks%n)
     integer :: b
 
     call update_loads(contacts%sleep)
+    contacts%loads%force = 0.0_wp
+    contacts%loads%torque = 0.0_wp
     if (all_still(blocks)) then
-      contacts%loads%force = 0.0_wp
-      contacts%loads%torque = 0.0_wp
       call list_bodies(blocks%present, contacts%acting)
       call hold_or_wake(gravity, contacts, blocks, changed)
       if (changed) call restore_contacts(blocks, contacts)
@@ -36,10 +35,17 @@ contains
       candidate = [(may_sleep(gravity, b, blocks, contacts%sleep), b=1, blocks%n)]
       changed = any(candidate)
       if (changed) then
-        call contacts%load_if_still(walls, gravity, dt, candidate, blocks)
+        call sum_memory(contacts%displacements, contacts%loads%force(:, 1:), &
+          contacts%loads%torque(:, 1:))
         call let_sleep(gravity, candidate, contacts, blocks, changed)
       end if
-      if (changed) call freeze_contacts(blocks, contacts)
+      if (changed) then   ! contact points between what does not move join the frozen ones
+        associate (memory => contacts%displacements)
+          call move_displacements([(at_rest(blocks, memory%a(b), memory%b(b)), b=1, memory%n)], &
+            memory, contacts%sleep%frozen)
+        end associate
+        call update_loads(contacts%sleep)
+      end if
     end if
     if (changed) call contacts%detect(walls, blocks)
     associate (frozen => contacts%sleep%frozen)
@@ -151,22 +157,6 @@ contains
       yes = blocks%fixed(b) .and. .not. blocks%still(b)
     end if
   end function is_carried
-
-  !> Move the displacements of contact points between what does not move to the frozen ones, with
-  !! their forces.
-  subroutine freeze_contacts(blocks, contacts)
-    type(blocks_t), intent(in) :: blocks
-    class(contact_solver_t), intent(inout) :: contacts
-    logical :: chosen(contacts%displacements%n)
-    integer :: g
-
-    associate (displacements => contacts%displacements)
-      chosen = [(at_rest(blocks, displacements%a(g), displacements%b(g)), g=1, displacements%n)]
-      call contacts%store_forces(chosen)
-      call move_displacements(chosen, displacements, contacts%sleep%frozen)
-    end associate
-    call update_loads(contacts%sleep)
-  end subroutine freeze_contacts
 
   !> Give the displacements of contact points with a body that moves now back to those at work.
   subroutine restore_contacts(blocks, contacts)

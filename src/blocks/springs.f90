@@ -4,21 +4,20 @@
 !! them the other half, so that springs are second order in time and a free fall is exact.
 module springs_m
   use kinds_m, only: wp
-  use case_types_m, only: contact_input_t, is_given
+  use case_types_m, only: contact_input_t
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t, drift, kick_body, haste
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use sleep_m, only: put_to_sleep
   use lubrication_m, only: lubricate
-  use counterparts_m, only: wrench_t, update_motion, update_inertia, motion_between
+  use counterparts_m, only: update_motion, update_inertia
   use displacements_m, only: displacements_t, reserve_displacements
   use contact_points_m, only: form_groups, keep_touching
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
-  use contact_law_m, only: stored_energy
   use contact_laws_m, only: choose_law
   use contact_response_m, only: response_t, respond, stiffness_limit
-  use contact_forces_m, only: match_displacements, integrate_displacements, sum_pairs, push_group, &
+  use contact_forces_m, only: match_displacements, integrate_displacements, sum_groups, &
     elastic_energy
   use contact_solver_m, only: contact_solver_t, contact_report_t, start_solver, equal_substep, &
     list_bodies, store_counterparts
@@ -33,19 +32,16 @@ module springs_m
   type, extends(contact_solver_t) :: springs_t
     type(contact_spheres_t) :: spheres
     type(response_t) :: response
-    real(wp) :: substep_ratio = 1.0_wp           !! longest substep over the fluid step [-]
+    real(wp) :: substep_ratio = 0.0_wp           !! longest substep over the fluid step [-]
     real(wp) :: contact_time = 0.0_wp            !! [s]
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
     real(wp) :: stiffness_limit = 0.0_wp         !! longest substep for all springs [s]
     type(displacements_t) :: before              !! work: displacements of the substep before
     real(wp), allocatable :: support(:, :)
       !! (6, n) force and torque that hold a sleeper when the step begins [N], [N m]
-    real(wp) :: substep = 0.0_wp                 !! with which `load_if_still` found forces [s]
   contains
     procedure, pass(contacts) :: init
     procedure, pass(contacts) :: detect
-    procedure, pass(contacts) :: load_if_still
-    procedure, pass(contacts) :: store_forces
     procedure, pass(contacts) :: advance
     procedure, pass(contacts) :: energy
   end type springs_t
@@ -62,7 +58,7 @@ contains
     call choose_law(input, contacts%response%law)
     contacts%contact_time = input%contact_time
     contacts%courant_max = input%courant_max
-    if (is_given(input%substep_ratio)) contacts%substep_ratio = input%substep_ratio
+    contacts%substep_ratio = input%substep_ratio
     call reserve_displacements(1, contacts%before)
     allocate (contacts%support(6, blocks%n), source=0.0_wp)
   end subroutine init
@@ -106,66 +102,6 @@ contains
       call form_groups(points, response%groups)
     end associate
   end subroutine find_springs
-
-  !> Contact forces and torques of the first substep if the candidates for sleep begin it at rest.
-  subroutine load_if_still(walls, gravity, dt, candidate, contacts, blocks)
-    type(walls_t), intent(in) :: walls
-    real(wp), intent(in) :: gravity(3), dt   !! [m/s2], fluid step [s]
-    logical, intent(in) :: candidate(:)      !! (n)
-    class(springs_t), intent(inout) :: contacts
-    type(blocks_t), intent(in) :: blocks
-    type(contact_report_t) :: ignored
-    integer :: b
-
-    contacts%substep = equal_substep(dt, substep_limit(walls, dt, contacts, blocks))
-    call match_displacements(contacts%points, contacts%response%groups, contacts%before, &
-      contacts%displacements)
-    associate (acting => contacts%acting, counterparts => contacts%counterparts, &
-      loads => contacts%loads)
-      call update_motion(blocks, acting%body(:acting%n), counterparts)
-      do b = 1, blocks%n   ! velocities in the middle of the substep
-        if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-        associate (v => counterparts%v(:, b), omega => counterparts%omega(:, b))
-          if (candidate(b)) v = 0.0_wp
-          if (candidate(b)) omega = 0.0_wp
-          v = v + 0.5_wp*contacts%substep*(gravity + contacts%steady(1:3, b)/blocks%mass(b))
-          omega = omega + 0.5_wp*contacts%substep &
-            *matmul(counterparts%inverse_inertia(:, :, b), contacts%steady(4:6, b))
-        end associate
-      end do
-      loads%force = 0.0_wp
-      loads%torque = 0.0_wp
-      call sum_pairs(contacts%substep, contacts%points, contacts%response, counterparts, &
-        contacts%displacements, loads, ignored)
-    end associate
-  end subroutine load_if_still
-
-  !> Store the forces and energies of chosen contact points with their displacements.
-  subroutine store_forces(chosen, contacts)
-    logical, intent(in) :: chosen(:)   !! (displacements)
-    class(springs_t), intent(inout) :: contacts
-    type(contact_report_t) :: ignored
-    type(wrench_t) :: wrench
-    integer :: g, t
-
-    associate (response => contacts%response, displacements => contacts%displacements)
-      do g = 1, displacements%n
-        if (.not. chosen(g)) cycle
-        wrench = wrench_t()
-        call push_group(g, contacts%substep, motion_between(contacts%counterparts, &
-          displacements%a(g), displacements%b(g)), contacts%points, response, displacements, &
-          wrench, ignored)
-        displacements%force(:, g) = wrench%force
-        displacements%torque_a(:, g) = wrench%torque_a
-        displacements%torque_b(:, g) = wrench%torque_b
-        displacements%energy(g) = stored_energy(displacements%k(g), response%law%gamma_t, &
-          norm(displacements%xi(:, g)))
-        do t = response%groups%first(g), response%groups%first(g + 1) - 1
-          displacements%energy(g) = displacements%energy(g) + response%energy(t)
-        end do
-      end do
-    end associate
-  end subroutine store_forces
 
   !> Move the blocks through a fluid step in substeps.
   subroutine advance(walls, gravity, dt, contacts, blocks, report)
@@ -337,7 +273,7 @@ contains
       call update_motion(blocks, acting, counterparts)
       loads%force = 0.0_wp
       loads%torque = 0.0_wp
-      call sum_pairs(dt_b, contacts%points, contacts%response, counterparts, displacements, loads, &
+      call sum_groups(dt_b, contacts%points, contacts%response, counterparts, displacements, loads, &
         report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
         contacts%lubrication, loads%force)

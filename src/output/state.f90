@@ -102,10 +102,10 @@ contains
       call list%add('/light/wet', 'm3', state%light%wet)
       call list%add('/light/force', 'N, N m', state%light%force)
     end if
-    associate (contacts => state%contacts, warm => state%contacts%exact)
-      call list_displacements('/contacts/', warm, warm, contacts%displacements, list)
+    associate (contacts => state%contacts)
+      call list_displacements('/contacts/', contacts%exact, contacts%displacements, list)
       call list%add('/contacts/quiet', 's', contacts%sleep%quiet)
-      call list_displacements('/contacts/rest_', .true., warm, contacts%sleep%frozen, list)
+      call list_displacements('/contacts/rest_', contacts%exact, contacts%sleep%frozen, list)
     end associate
   end subroutine list_state
 
@@ -170,10 +170,9 @@ contains
   end subroutine list_blocks
 
   !> The tangential displacements of contact points.
-  subroutine list_displacements(name, with_force, with_edge, s, list)
+  subroutine list_displacements(name, with_edge, s, list)
     character(*), intent(in) :: name
-    logical, intent(in) :: with_force   !! forces, torques and energies are remembered
-    logical, intent(in) :: with_edge    !! and the edge of the counterpart
+    logical, intent(in) :: with_edge    !! the edge of the counterpart is remembered
     type(displacements_t), intent(inout), target :: s
     type(state_list_t), intent(inout) :: list
 
@@ -186,7 +185,6 @@ contains
       call list%add(name//'stretch', 'm', s%xi(:, :n))
       call list%add(name//'stiffness', 'N/m^gamma', s%k(:n))
       if (with_edge) call list%add(name//'edge', s%other(:n))
-      if (.not. with_force) return
       call list%add(name//'force', 'N', s%force(:, :n))
       call list%add(name//'torque_a', 'N m', s%torque_a(:, :n))
       call list%add(name//'torque_b', 'N m', s%torque_b(:, :n))

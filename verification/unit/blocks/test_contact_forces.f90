@@ -6,11 +6,12 @@ module test_contact_forces_m
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t, add_point, form_groups
   use displacements_m, only: displacements_t, reserve_displacements
+  use sleep_m, only: sum_memory
   use contact_laws_m, only: choose_law
   use counterparts_m, only: counterparts_t
   use contact_response_m, only: response_t, respond
   use contact_solver_m, only: loads_t, contact_report_t
-  use contact_forces_m, only: match_displacements, integrate_displacements, sum_pairs, &
+  use contact_forces_m, only: match_displacements, integrate_displacements, sum_groups, &
     elastic_energy
   use two_cubes_m, only: vector, free_bodies
   implicit none
@@ -89,7 +90,7 @@ contains
 
     loads%force = 0.0_wp
     loads%torque = 0.0_wp
-    call sum_pairs(dt, points, response, counterparts, displacements, loads, report)
+    call sum_groups(dt, points, response, counterparts, displacements, loads, report)
   end subroutine sum_forces
 
   !> Forces of many contact points in all directions add up to nothing, and so do their moments
@@ -98,7 +99,7 @@ contains
     integer, parameter :: a(8) = [2, 2, 3, 3, 3, 3, 3, 3], b(8) = [1, 1, floor, floor, 1, 1, 1, 2]
     type(displacements_t) :: displacements
     type(contact_point_t) :: point(8)
-    real(wp) :: place(3, bed_counterpart:3), p(3), moment(3)
+    real(wp) :: place(3, bed_counterpart:3), p(3), moment(3), remembered(3, 3, 2)
     integer :: t, i
 
     call begin(1.5_wp, 20.0_wp)
@@ -125,6 +126,12 @@ contains
     call check('and so do moments', moment, 0*x, 1.0e-11_wp)
     call check('all bodies are pushed', minval(norm2(loads%force(:, 1:3), 1)) > 1.0_wp)
     call check('the floor too', norm2(loads%force(:, floor)) > 1.0_wp)
+    remembered = 0.0_wp
+    call sum_memory(displacements, remembered(:, :, 1), remembered(:, :, 2))
+    call check('remembered forces', maxval(abs(remembered(:, :, 1) - loads%force(:, 1:))), 0.0_wp, &
+      1.0e-12_wp)
+    call check('and torques', maxval(abs(remembered(:, :, 2) - loads%torque(:, 1:))), 0.0_wp, &
+      1.0e-12_wp)
   end subroutine check_reaction
 
   !> The elastic energy grows with depth and with a tangential displacement as their forces tell,
@@ -154,6 +161,7 @@ contains
     end do
     call check('slope of its energy', (energy(1) - energy(-1))/(2*step), k_t*stretch**1.5_wp, &
       1.0e-6_wp*k_t*stretch**1.5_wp)
+    call check('the energy remembered', displacements%energy(1), energy(1), 1.0e-14_wp)
     call reserve_displacements(2, rest)
     rest%n = 2
     rest%energy(:2) = [1.0_wp, 2.0_wp]

@@ -3,6 +3,8 @@ module test_resting_m
   use check_m, only: check, wp
   use errors_m, only: to_text
   use sleep_m, only: update_stillness
+  use walls_m, only: floor_wall
+  use displacements_m, only: reserve_displacements
   use counterparts_m, only: update_counterparts
   use resting_m, only: wake_or_sleep
   use world_m, only: world_t, set_up, body
@@ -12,7 +14,7 @@ module test_resting_m
 
   real(wp), parameter :: r = 0.05_wp          !! of the balls [m]
   real(wp), parameter :: k_n = 1.0e6_wp       !! of their springs [N/m]
-  real(wp), parameter :: dt = 1.0e-3_wp, gravity(3) = [0.0_wp, 0.0_wp, -10.0_wp]
+  real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -10.0_wp]
   real(wp) :: load                            !! weight of a ball [N]
 
 contains
@@ -24,7 +26,8 @@ contains
     call check_held()
   end subroutine test_resting
 
-  !> A ball, slow for long, on the floor or a held ball; its spring carries a part of its weight.
+  !> A ball, slow for long, on the floor or a held ball; its spring carries a part of its weight, as
+  !! is remembered of the last substep.
   subroutine begin(part, support, speed, world)
     real(wp), intent(in) :: part         !! 1: in balance [-]
     integer, intent(in) :: support       !! 0: the floor, 1: a ball that is held
@@ -48,13 +51,25 @@ contains
       world%contacts%counterparts)
     call update_stillness(world%blocks, changed)
     call world%contacts%detect(world%walls, world%blocks)
+    call reserve_displacements(1, world%contacts%displacements)
+    associate (memory => world%contacts%displacements)
+      memory%n = world%contacts%points%n
+      memory%a(1) = 1 + support
+      memory%b(1) = merge(1, floor_wall, support == 1)
+      memory%id(1) = 1
+      memory%xi = 0.0_wp
+      memory%torque_a = 0.0_wp
+      memory%torque_b = 0.0_wp
+      memory%force(:, 1) = [0.0_wp, 0.0_wp, part*load]
+      memory%energy(1) = 0.5_wp*(part*load)**2/k_n
+    end associate
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin
 
   subroutine start_step(world)
     type(world_t), intent(inout) :: world
 
-    call wake_or_sleep(world%walls, gravity, dt, world%contacts, world%blocks)
+    call wake_or_sleep(world%walls, gravity, world%contacts, world%blocks)
   end subroutine start_step
 
   !> It sleeps where forces balance within 0.2 % of the load, fluid included, and wakes above 2 %.
