@@ -61,7 +61,7 @@ contains
       !! (3, counterparts) of all counterparts [N]
     real(wp), parameter :: round_off = 1.0e-9_wp
     logical :: active(blocks%n)
-    real(wp) :: f(3), n(3), gap, sides, opening
+    real(wp) :: f(3), d(3), n(3), gap, sides, opening
     integer :: a, b, p, w
 
     active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
@@ -74,7 +74,14 @@ contains
         do while (p <= near%n)
           if (near%a(p) /= a) exit
           b = near%b(p)
-          f = film_of_pair(walls%period, blocks, b, a, dt, ahead, lubrication)
+          d = blocks%x(:, a) - blocks%x(:, b)
+          d = d + nearest_shift(walls%period, d)
+          associate (r_a => lubrication%radius(a), r_b => lubrication%radius(b), &
+            n => d/max(norm(d), tiny(1.0_wp)))
+            opening = dot_product(n, blocks%v(:, a) - blocks%v(:, b))
+            f = push(lubrication, r_b*r_a/(r_b + r_a), n, norm(d) - r_b - r_a + ahead*opening, &
+                     opening, inverse_mass(blocks, b) + inverse_mass(blocks, a), dt)*n
+          end associate
           force(:, b) = force(:, b) - f
           force(:, a) = force(:, a) + f
           p = p + 1
@@ -95,30 +102,6 @@ contains
     end associate
   end subroutine lubricate
 
-  !> Force of the film between spheres a and b on b, its opposite acts on a [N].
-  pure function film_of_pair(period, blocks, a, b, dt, ahead, lubrication) result(f)
-    real(wp), intent(in) :: period(3)                 !! 0 where not periodic [m]
-    type(blocks_t), intent(in) :: blocks
-    integer, intent(in) :: a, b
-    real(wp), intent(in) :: dt, ahead                 !! [s]
-    type(lubrication_t), intent(in) :: lubrication
-    real(wp) :: f(3)
-    real(wp) :: d(3), n(3), gap, opening, distance, radius
-
-    f = 0.0_wp
-    d = blocks%x(:, b) - blocks%x(:, a)
-    d = d + nearest_shift(period, d)
-    distance = norm(d)
-    if (distance <= 0.0_wp) return
-    gap = distance - lubrication%radius(a) - lubrication%radius(b)
-    n = d/distance
-    radius = lubrication%radius(a)*lubrication%radius(b) &
-      /(lubrication%radius(a) + lubrication%radius(b))
-    opening = dot_product(n, blocks%v(:, b) - blocks%v(:, a))
-    f = push(lubrication, radius, n, gap + ahead*opening, opening, &
-             inverse_mass(blocks, a) + inverse_mass(blocks, b), dt)*n
-  end function film_of_pair
-
   !> Force that drives the two sides of a film apart; negative where it holds them together [N].
   !!
   !! The resistance is its mean over the gaps that the substep passes, and acts on the velocity in
@@ -136,7 +119,7 @@ contains
 
     cell = norm(n*lubrication%h)
     f = 0.0_wp
-    if (gap >= cutoff*cell) return
+    if (gap >= cutoff*cell .or. .not. cell > 0.0_wp) return
     a = sqrt(2.0_wp)*cell
     half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*roughness*radius)
     associate (mu => lubrication%viscosity)
