@@ -1,7 +1,7 @@
 !> Everything that lives as long as the run, and how it begins.
 module simulation_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t, contact_of
+  use case_types_m, only: case_t
   use grid_m, only: grid_init
   use scratch_m, only: scratch_t, scratch_init
   use fields_m, only: flow_init
@@ -80,7 +80,7 @@ contains
     call walls_init(case%grid, case%boundary, sim%walls)
     sim%walls%bed => bed
     call blocks_init(case, shapes, sim%blocks)
-    call contacts_init(contact_of(case), sim%blocks, sim%contacts)
+    call contacts_init(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
     allocate (sim%pending(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)

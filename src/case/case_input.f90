@@ -90,11 +90,7 @@ contains
     type(shape_input_t), allocatable :: all(:)
     integer :: s, k, n, b
 
-    n = 0
-    do s = 1, size(case%shape)
-      n = n + max(1, members(case%shape(s)))
-    end do
-    allocate (all(n))
+    allocate (all(sum([(max(1, members(case%shape(s))), s=1, size(case%shape))])))
     n = 0
     do s = 1, size(case%shape)
       associate (family => case%shape(s))

@@ -10,7 +10,7 @@ module case_types_m
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
   public :: place_t, handling_t, max_variants
-  public :: absent, is_given, size_count, smallest_spacing, has_flow, contact_of, not_resolved
+  public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved
   public :: member_name
   public :: start_t, begun_t
 
@@ -95,7 +95,7 @@ module case_types_m
     real(wp) :: k_n = 1.0e5_wp, gamma_n = 1.0_wp, eta_n = 10.0_wp   !! [N/m^gamma, -, N s/m]
     real(wp) :: k_t = 1.0e5_wp, gamma_t = 1.0_wp, eta_t = 10.0_wp
     real(wp) :: friction = 0.6_wp, wall_friction = 0.4_wp
-    real(wp) :: substep_ratio = absent              !! absent: by `contact_of`
+    real(wp) :: substep_ratio = 0.05_wp             !! of the paper
     real(wp) :: courant_max = 0.1_wp                !! C_s of eq. (6)
     logical :: sleep = .true.
     logical :: lubrication = .false.
@@ -229,17 +229,6 @@ contains
 
     yes = run%physics == 'coupled' .or. run%physics == 'fluid'
   end function has_flow
-
-  !> How the blocks of a case touch. Where it does not say how long substeps may be: the share of a
-  !! step that the paper gives; in 'light', whose steps follow what falls, a step.
-  pure function contact_of(case) result(contact)
-    type(case_t), intent(in) :: case
-    type(contact_input_t) :: contact
-
-    contact = case%contact
-    if (.not. is_given(contact%substep_ratio)) contact%substep_ratio = merge(1.0_wp, 0.05_wp, &
-      case%run%physics == 'light')
-  end function contact_of
 
   !> How many lengths the size of a kind of shape has; 0 where it comes from a file or a mass.
   pure function size_count(kind) result(n)

@@ -17,6 +17,11 @@ module run_groups_m
   real(wp), parameter :: max_cells = real(huge(0), wp)   !! cells are counted in default integers
   real(wp), parameter :: max_steps = 1.0e9_wp
   character(1), parameter :: axis(3) = ['x', 'y', 'z']
+  character(5), parameter :: side_name(2, 3) = reshape([character(5) :: 'x_min', 'x_max', &
+    'y_min', 'y_max', 'z_min', 'z_max'], [2, 3])
+  character(*), parameter :: side_in_words(2, 3) = reshape([character(21) :: &
+    'the side of lowest x', 'the side of highest x', 'the side of lowest y', &
+    'the side of highest y', 'the side of lowest z', 'the side of highest z'], [2, 3])
   real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
 
   !> Volumes and inertias of lengths from this to its inverse stay in the number range [m].
@@ -105,6 +110,7 @@ contains
   subroutine visit_boundary(v, boundary)
     type(group_visitor_t), intent(inout) :: v
     type(boundary_input_t), intent(inout) :: boundary
+    character(8), parameter :: inward(2) = ['positive', 'negative']
     character(8), parameter :: along(3) = ['0, 0.1, ', '0.1, 0, ', '0.1, 0, ']
     integer :: d, s
 
@@ -112,7 +118,7 @@ contains
     do d = 1, 3
       do s = 1, 2
         call v%option(side_name(s, d), boundary%kind(s, d), &
-          side_names, trim(side_meaning(s, d))//': a wall to ' &
+          side_names, trim(side_in_words(s, d))//': a wall to ' &
           //'which the fluid sticks or along which it slips, open (pressure 0), periodic (with ' &
           //'the side across), or where a stream enters or leaves', example='''slip''')
       end do
@@ -120,69 +126,37 @@ contains
     do d = 1, 3
       do s = 1, 2
         call v%real(side_name(s, d)//'_velocity', boundary%velocity(:, s, d), any_number('m/s'), &
-          'velocity of '//trim(side_meaning(s, d))//': of a wall, in its own plane, or of an ' &
+          'velocity of '//trim(side_in_words(s, d))//': of a wall, in its own plane, or of an ' &
           //'inflow, into the tank', &
           example=side_name(s, d)//' = ''no_slip''  '//side_name(s, d)//'_velocity = '//along(d) &
           //'0')
       end do
     end do
     do d = 1, 3
-      if (.not. (v%good(side_name(1, d)) .and. v%good(side_name(2, d)))) cycle
       do s = 1, 2
-        call v%require(side_name(s, d), boundary%kind(s, d) /= 'periodic' &
-          .or. boundary%kind(3 - s, d) == 'periodic', 'needs periodic on both sides, but ' &
-          //side_name(3 - s, d)//' = '//quoted_text(trim(boundary%kind(3 - s, d))))
-      end do
-    end do
-    do d = 1, 3
-      do s = 1, 2
-        if (.not. (v%good(side_name(s, d)) .and. v%good(side_name(s, d)//'_velocity'))) cycle
-        call require_side_velocity(side_name(s, d)//'_velocity', trim(boundary%kind(s, d)), &
-                                   boundary%velocity(:, s, d))
-      end do
-    end do
-    do d = 1, 3
-      do s = 1, 2
+        if (v%good(side_name(1, d)) .and. v%good(side_name(2, d))) call v%require(side_name(s, d), &
+          boundary%kind(s, d) /= 'periodic' .or. boundary%kind(3 - s, d) == 'periodic', &
+          'needs periodic on both sides, but '//side_name(3 - s, d)//' = ' &
+          //quoted_text(trim(boundary%kind(3 - s, d))))
+        if (v%good(side_name(s, d)) .and. v%good(side_name(s, d)//'_velocity')) then
+          associate (variable => side_name(s, d)//'_velocity', velocity => boundary%velocity(:, s, &
+            d), code => side_code(boundary%kind(s, d)))
+            if (is_wall(code)) then
+              call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own ' &
+                //'plane, the '//axis(d)//' component must be 0')
+            else if (gives_velocity(code)) then
+              call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must ' &
+                //'enter the tank, the '//axis(d)//' component must be '//inward(s))
+            else
+              call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows ' &
+                //'have a velocity, not a side that is '//quoted_text(trim(boundary%kind(s, d))))
+            end if
+          end associate
+        end if
         call v%judge(side_name(s, d), boundary%faulty(s, d))
       end do
     end do
-  contains
-    !> A wall moves in its own plane, an inflow enters the tank, the other sides have no velocity.
-    subroutine require_side_velocity(variable, kind, velocity)
-      character(*), intent(in) :: variable, kind
-      real(wp), intent(in) :: velocity(3)   !! [m/s]
-      character(8), parameter :: sign_word(2) = ['positive', 'negative']
-
-      if (is_wall(side_code(kind))) then
-        call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own ' &
-                       //'plane, the '//axis(d)//' component must be 0')
-      else if (gives_velocity(side_code(kind))) then
-        call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must enter ' &
-                       //'the tank, the '//axis(d)//' component must be '//sign_word(s))
-      else
-        call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows have ' &
-                       //'a velocity, not a side that is '//quoted_text(kind))
-      end if
-    end subroutine require_side_velocity
   end subroutine visit_boundary
-
-  !> A side of the tank in words.
-  pure function side_meaning(s, d) result(meaning)
-    integer, intent(in) :: s, d   !! 1 lower or 2 upper side; direction
-    character(24) :: meaning
-
-    meaning = 'the side of lowest '//axis(d)
-    if (s == 2) meaning = 'the side of highest '//axis(d)
-  end function side_meaning
-
-  !> Name of a side of the tank: `x_min`, `x_max`, `y_min`, ...
-  pure function side_name(s, d) result(name)
-    integer, intent(in) :: s, d   !! 1 lower or 2 upper side; direction
-    character(5) :: name
-    character(4), parameter :: end_name(2) = ['_min', '_max']
-
-    name = axis(d)//end_name(s)
-  end function side_name
 
   !> `&fluid`
   subroutine visit_fluid(v, fluid)

@@ -4,8 +4,8 @@ module case_plan_m
   use kinds_m, only: wp, i8
   use vectors_m, only: cube_root, norm
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, contact_input_t, is_given, &
-    smallest_spacing, has_flow, contact_of, not_resolved
+  use case_types_m, only: case_t, is_given, &
+    smallest_spacing, has_flow, not_resolved
   use rigid_body_m, only: blocks_t
   use case_blocks_m, only: blocks_init
   use boundary_kinds_m, only: side_code, gives_pressure
@@ -383,7 +383,6 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     class(contact_law_t), allocatable :: law
-    type(contact_input_t) :: contact
     character(:), allocatable :: units
     real(wp) :: ratio_step, time_step, courant_step, heaviest, mass, k
     integer :: s
@@ -392,8 +391,7 @@ contains
       call entry('contact step', brief(case%contact%contact_time)//' s, the contact time, at most')
       return
     end if
-    contact = contact_of(case)
-    ratio_step = contact%substep_ratio*case%run%dt
+    ratio_step = case%contact%substep_ratio*case%run%dt
     time_step = case%contact%contact_time/substeps_per_contact
     courant_step = case%contact%courant_max*d_s/speed
     call entry('body step', brief(min(ratio_step, time_step, courant_step)) &

@@ -3,7 +3,7 @@
 module test_case_input_m
   use check_m, only: check, wp, pi
   use errors_m, only: problems_t
-  use case_types_m, only: case_t, contact_input_t, contact_of, is_given
+  use case_types_m, only: case_t, is_given
   use case_input_m, only: read_case, parameters_text
   implicit none
   private
@@ -17,32 +17,11 @@ module test_case_input_m
 contains
 
   subroutine test_case_input()
-    call test_substeps()
     call test_values()
     call test_attitudes()
     call test_way_back()
     call test_rock()
   end subroutine test_case_input
-
-  !> A substep of springs is a share of a step; in 'light' it may be one.
-  subroutine test_substeps()
-    call check('substeps', &
-      [substep_ratio('coupled', ''), substep_ratio('dry', ''), substep_ratio('light', ''), &
-      substep_ratio('light', 'substep_ratio = 0.05')], [0.05_wp, 0.05_wp, 1.0_wp, 0.05_wp])
-  end subroutine test_substeps
-
-  function substep_ratio(physics, contact)
-    character(*), intent(in) :: physics, contact
-    real(wp) :: substep_ratio
-    type(contact_input_t) :: contact_input
-    type(case_t) :: case
-    type(problems_t) :: problems
-
-    call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid &
-      //'&fluid water_level = 0.1 / &contact model = ''spheres'' '//contact//' /', case, problems)
-    contact_input = contact_of(case)
-    substep_ratio = contact_input%substep_ratio
-  end function substep_ratio
 
   !> Values arrive where they belong; each repeated group starts from the defaults.
   subroutine test_values()
