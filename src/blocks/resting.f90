@@ -4,8 +4,8 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use displacements_m, only: move_displacements
-  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, rest_tolerance, wake_tolerance, &
-    put_to_sleep, wake, all_still
+  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, rest_tolerance, &
+    wake_tolerance, put_to_sleep, wake, all_still
   use counterparts_m, only: counterparts_t
   use contact_solver_m, only: contact_solver_t, list_bodies, store_counterparts
   implicit none

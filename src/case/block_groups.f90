@@ -76,7 +76,8 @@ contains
     call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on wall and bed', example='0.5')
     call v%real('substep_ratio', contact%substep_ratio, share, &
-      'longest step of the blocks over that of the run, with springs', example=spheres//'substep_ratio = 0.02')
+      'longest step of the blocks over that of the run, with springs', &
+      example=spheres//'substep_ratio = 0.02')
     call v%real('courant_max', contact%courant_max, share, 'way of a block in one of its ' &
       //'steps over the size of its contact spheres, at most: eq. (6) of the paper, springs', &
       example=spheres//'courant_max = 0.05')

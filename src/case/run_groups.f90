@@ -148,8 +148,9 @@ contains
               call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must ' &
                 //'enter the tank, the '//axis(d)//' component must be '//inward(s))
             else
-              call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows ' &
-                //'have a velocity, not a side that is '//quoted_text(trim(boundary%kind(s, d))))
+              call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and ' &
+                //'inflows have a velocity, not a side that is ' &
+                //quoted_text(trim(boundary%kind(s, d))))
             end if
           end associate
         end if
