@@ -1,7 +1,7 @@
 !> Everything that lives as long as the run, and how it begins.
 module simulation_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, contact_input_t
   use grid_m, only: grid_init
   use scratch_m, only: scratch_t, scratch_init
   use fields_m, only: flow_init
@@ -15,11 +15,13 @@ module simulation_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: lowering, kinetic_energy, potential_energy
+  use rigid_body_m, only: blocks_t, lowering, kinetic_energy, potential_energy
   use case_blocks_m, only: blocks_init, turn_with_fluid
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
-  use contacts_m, only: contacts_init
+  use contact_solver_m, only: contact_solver_t
+  use impulse_step_m, only: impulses_t
+  use springs_m, only: springs_t
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
@@ -36,7 +38,7 @@ module simulation_m
   use timers_m, only: name_phase
   implicit none
   private
-  public :: simulation_t, simulation_init, resume, measure, energies
+  public :: simulation_t, simulation_init, choose_contact, resume, measure, energies
 
   !> The state, what is made of the case, and the work of the stages.
   type, extends(run_state_t) :: simulation_t
@@ -80,7 +82,7 @@ contains
     call walls_init(case%grid, case%boundary, sim%walls)
     sim%walls%bed => bed
     call blocks_init(case, shapes, sim%blocks)
-    call contacts_init(case%contact, sim%blocks, sim%contacts)
+    call choose_contact(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
     allocate (sim%pending(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)
@@ -123,6 +125,20 @@ contains
                     sim%coupling, sim%start_converged)
     call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
+
+  !> The contact solver of a case.
+  subroutine choose_contact(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    class(contact_solver_t), allocatable, intent(out) :: contacts
+
+    select case (input%solver)
+    case ('springs'); allocate (springs_t :: contacts)
+    case ('impulses'); allocate (impulses_t :: contacts)
+    case default; error stop 'choose_contact: no such solver'
+    end select
+    call contacts%init(input, blocks)
+  end subroutine choose_contact
 
   !> The coupling of the case, with its work arrays.
   subroutine choose_coupling(case, n_solids, sim)

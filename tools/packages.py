@@ -88,13 +88,13 @@ ALONG = 0.42  # of an arrow is before its count
 def picture(found: Imports) -> Figure:
     """The packages in their layers; an arrow runs from the user to the used and bears its count."""
     counts, files = arrows(found), Counter(package_of(file) for file in found)
-    figure = Figure(figsize=(10.5, 9.4))
+    figure = Figure(figsize=(10.5, 10.0))
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axis.set_xlim(0.7, 12.6)
-    axis.set_ylim(-0.45, 10.2)
+    axis.set_ylim(-0.45, 10.85)
     axis.axis("off")
     for package, height in BANDS.items():
-        up = package in ("setup", TOP)
+        up = package in ("paper", "setup", TOP)
         others = [
             (b if up else a, n) for (a, b), n in counts.items() if package == (a if up else b)
         ]

@@ -96,7 +96,7 @@ contains
     real(wp), intent(in) :: bounding_radius(:)   !! (n) farthest point that touches [m]
     class(contact_solver_t), intent(inout) :: contacts
 
-    call counterparts_init(blocks, contacts%counterparts)
+    call counterparts_init(blocks%n, contacts%counterparts)
     allocate (contacts%acting%body(blocks%n), source=0)
     call ensure_points(1, contacts%points)
     associate (loads => contacts%loads, n => blocks%n)

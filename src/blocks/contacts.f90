@@ -1,7 +1,6 @@
 !> The motion of the blocks through a fluid step, in which they touch.
 module contacts_m
   use kinds_m, only: wp
-  use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t, begin_step, hold_sleepers, look_ahead, follow_motions, &
     fastest_point
   use walls_m, only: walls_t, floor_wall
@@ -10,27 +9,11 @@ module contacts_m
   use counterparts_m, only: update_counterparts
   use contact_solver_m, only: contact_solver_t, contact_report_t
   use resting_m, only: wake_or_sleep, restore_contacts
-  use springs_m, only: springs_t
-  use impulse_step_m, only: impulses_t
   implicit none
   private
-  public :: contact_solver_t, contacts_init, move_blocks, contact_report_t
+  public :: contact_solver_t, move_blocks, contact_report_t
 
 contains
-
-  !> The contact solver of a case.
-  subroutine contacts_init(input, blocks, contacts)
-    type(contact_input_t), intent(in) :: input
-    type(blocks_t), intent(in) :: blocks
-    class(contact_solver_t), allocatable, intent(out) :: contacts
-
-    select case (input%solver)
-    case ('springs'); allocate (springs_t :: contacts)
-    case ('impulses'); allocate (impulses_t :: contacts)
-    case default; error stop 'contacts_init: no such solver'
-    end select
-    call contacts%init(input, blocks)
-  end subroutine contacts_init
 
   !> Move the blocks through one fluid step under gravity, the last fluid forces and contact.
   !!

@@ -5,7 +5,6 @@ module counterparts_m
   use rigid_body_m, only: blocks_t, space_tensor
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
-  use contact_laws_m, only: hard_depth, rest_overlap_share
   implicit none
   private
   public :: counterparts_t, inertia_t, motion_t, wrench_t
@@ -17,9 +16,6 @@ module counterparts_m
   type :: counterparts_t
     real(wp) :: gravity = 0.0_wp                       !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, counterparts) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)
-      !! (counterparts) depth where contacts harden [m]
-    real(wp), allocatable :: rest_overlap(:)           !! (counterparts) largest overlap at rest [m]
     real(wp) :: heaviest = 0.0_wp                      !! mass of the heaviest free body [kg]
     real(wp), allocatable :: inverse_mass(:)
       !! (counterparts) 0: walls, fixed bodies [1/kg]
@@ -46,26 +42,14 @@ module counterparts_m
 
 contains
 
-  !> Room for the walls and the bodies, the depth at which contact points of each harden, and the
-  !! overlap that each may have at rest, a share of its smallest edge.
-  pure subroutine counterparts_init(blocks, counterparts)
-    type(blocks_t), intent(in) :: blocks
+  !> Room for the walls and n bodies.
+  pure subroutine counterparts_init(n, counterparts)
+    integer, intent(in) :: n
     type(counterparts_t), intent(out) :: counterparts
-    integer :: n, b
 
-    n = blocks%n
-    allocate (counterparts%hard(bed_counterpart:n), source=huge(1.0_wp))
-    allocate (counterparts%rest_overlap(bed_counterpart:n), source=huge(1.0_wp))
-    do b = 1, n
-      associate (shape => blocks%shapes(blocks%shape(b)))
-        counterparts%hard(b) = hard_depth(shape)
-        counterparts%rest_overlap(b) = rest_overlap_share*shape%smallest_edge
-      end associate
-    end do
     allocate (counterparts%v(3, bed_counterpart:n), counterparts%omega(3, bed_counterpart:n), &
-      source=0.0_wp)
-    allocate (counterparts%inverse_mass(bed_counterpart:n), source=0.0_wp)
-    allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
+      counterparts%inverse_mass(bed_counterpart:n), &
+      counterparts%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
   end subroutine counterparts_init
 
   !> Masses of all counterparts, their gravity and the velocity of the walls.

@@ -7,8 +7,8 @@ module two_cubes_m
   use vectors_m, only: rotation_matrix, quaternion_exp, quaternion_product
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t
-  use bed_m, only: bed_counterpart
-  use counterparts_m, only: counterparts_t
+  use counterparts_m, only: counterparts_t, counterparts_init
+  use contact_response_m, only: response_t
   use near_features_m, only: poses_t, meeting_t, update_views
   implicit none
   private
@@ -84,18 +84,16 @@ contains
   end function vector
 
   !> Bodies that do not turn, at rest, as counterparts; contact points of theirs do not harden.
-  pure subroutine free_bodies(mass, counterparts)
+  pure subroutine free_bodies(mass, counterparts, response)
     real(wp), intent(in) :: mass(:)   !! [kg]
     type(counterparts_t), intent(out) :: counterparts
-    integer :: n
+    type(response_t), intent(out) :: response   !! without a law
 
-    n = size(mass)
-    allocate (counterparts%v(3, bed_counterpart:n), counterparts%omega(3, bed_counterpart:n), &
-      counterparts%inverse_mass(bed_counterpart:n), &
-      counterparts%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
-    allocate (counterparts%hard(bed_counterpart:n), counterparts%rest_overlap(bed_counterpart:n), &
-      source=1.0_wp)
-    counterparts%inverse_mass(1:n) = 1/mass
+    call counterparts_init(size(mass), counterparts)
+    counterparts%inverse_mass(1:) = 1/mass
+    allocate (response%hard, response%rest_overlap, mold=counterparts%inverse_mass)
+    response%hard = 1.0_wp
+    response%rest_overlap = 1.0_wp
   end subroutine free_bodies
 
 end module two_cubes_m

@@ -7,7 +7,7 @@ module test_contacts_m
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: blocks_t, kinetic_energy, release_body
   use law_restitution_m, only: min_restitution
-  use contacts_m, only: contacts_init
+  use simulation_m, only: choose_contact
   use springs_m, only: springs_t
   use impulse_step_m, only: impulses_t
   use world_m, only: world_t, set_up, begin, body, move
@@ -419,7 +419,7 @@ contains
       call move(two, 40, 1.0e-2_wp)
       call check('same bits with another skin', same(one%blocks, two%blocks))
       call check('touching', sum(one%blocks%contacts) > 5)
-      call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
+      call choose_contact(two%case%contact, two%blocks, two%contacts)   ! as after a restart
       two%contacts%displacements = one%contacts%displacements
       two%contacts%sleep%quiet = one%contacts%sleep%quiet
       two%contacts%sleep%frozen = one%contacts%sleep%frozen

@@ -1,7 +1,6 @@
-!> Lists of displacements: order, parting, joining, groups of contact points that share one.
+!> Lists of displacements: order, parting, joining; pairs met.
 module test_displacements_m
   use check_m, only: check, wp
-  use contact_points_m, only: contact_point_t, contact_points_t, groups_t, add_point, form_groups
   use displacements_m, only: displacements_t, reserve_displacements, comes_before, &
     move_displacements
   use contact_solver_m, only: met_t, store_counterparts
@@ -14,7 +13,6 @@ contains
   subroutine test_displacements()
     call check_order()
     call check_moving()
-    call check_groups()
     call check_met()
   end subroutine test_displacements
 
@@ -83,27 +81,6 @@ contains
     call check('none left', from%n, 0)
     call check('all joined', is(to, [2, 3, 4, 5, 6, 7, 9]))
   end subroutine check_moving
-
-  !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.
-  subroutine check_groups()
-    type(contact_points_t) :: points
-    type(groups_t) :: groups
-    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
-
-    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp), points)
-    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 3.0_wp), points)
-    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 4.0_wp), points)
-    call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), points)
-    call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), points)
-    call form_groups(points, groups)
-    call check('ids and bodies', groups%n, 3)
-    call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
-    call check('one alone', groups%normal(:, 1), x)
-    call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
-    call check('mean point', groups%arm_a(:, 2), (3*x + 12*y)/7, 1.0e-15_wp)
-    call check('seen from b', groups%arm_b(:, 2), (3*x + 12*y)/7 - y, 1.0e-15_wp)
-    call check('opposite normals', groups%normal(:, 3), x)
-  end subroutine check_groups
 
   !> Pairs met are noted once, sorted.
   subroutine check_met()

@@ -4,7 +4,8 @@ module test_contact_forces_m
   use case_types_m, only: contact_input_t
   use vectors_m, only: cross
   use bed_m, only: bed_counterpart
-  use contact_points_m, only: contact_point_t, contact_points_t, add_point, form_groups
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
+  use contact_groups_m, only: groups_t, form_groups
   use displacements_m, only: displacements_t, reserve_displacements
   use sleep_m, only: sum_memory
   use contact_laws_m, only: choose_law
@@ -41,6 +42,7 @@ contains
     call check_strong_damping()
     call check_new_point()
     call check_memory()
+    call check_groups()
   end subroutine test_contact_forces
 
   !> Three bodies at rest, stiffnesses with the constants above and a normal dashpot.
@@ -58,8 +60,8 @@ contains
     input%eta_t = 0.0_wp
     input%friction = mu
     input%wall_friction = wall_mu
+    call free_bodies(mass, counterparts, response)
     call choose_law(input, response%law)
-    call free_bodies(mass, counterparts)
     do b = 1, 3
       counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
     end do
@@ -283,5 +285,26 @@ contains
     call detect_again(point, displacements)
     call check('what has parted is forgotten', displacements%xi(:, 3), 0*x)
   end subroutine check_memory
+
+  !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.
+  subroutine check_groups()
+    type(contact_points_t) :: list
+    type(groups_t) :: groups
+    real(wp), parameter :: y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
+
+    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp), list)
+    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 3.0_wp), list)
+    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 4.0_wp), list)
+    call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), list)
+    call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), list)
+    call form_groups(list, groups)
+    call check('ids and bodies', groups%n, 3)
+    call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
+    call check('one alone', groups%normal(:, 1), x)
+    call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
+    call check('mean point', groups%arm_a(:, 2), (3*x + 12*y)/7, 1.0e-15_wp)
+    call check('seen from b', groups%arm_b(:, 2), (3*x + 12*y)/7 - y, 1.0e-15_wp)
+    call check('opposite normals', groups%normal(:, 3), x)
+  end subroutine check_groups
 
 end module test_contact_forces_m

@@ -3,17 +3,24 @@
 module contact_response_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
-  use contact_points_m, only: contact_points_t, groups_t
+  use contact_points_m, only: contact_points_t
+  use contact_groups_m, only: groups_t
+  use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_counterpart
+  use contact_laws_m, only: choose_law, hard_depth, rest_overlap_share
+  use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, stiffness_t
   use counterparts_m, only: counterparts_t, inertia_t, motion_t, wrench_t, inertia_of, &
     inverse_effective_mass, relative_velocity, act
   implicit none
   private
-  public :: response_t, respond, stiffness_limit
+  public :: response_t, response_init, respond, stiffness_limit
 
   !> The law at work at each contact point.
   type :: response_t
     class(contact_law_t), allocatable :: law
+    real(wp), allocatable :: hard(:)             !! (counterparts) depth where contacts harden [m]
+    real(wp), allocatable :: rest_overlap(:)     !! (counterparts) largest overlap at rest [m]
     type(groups_t) :: groups                     !! contact points of one tangential displacement
     real(wp), allocatable :: k(:)                !! k_n of the contact point [N/m^gamma]
     real(wp), allocatable :: elastic(:)          !! force [N]
@@ -27,6 +34,25 @@ module contact_response_m
   end type response_t
 
 contains
+
+  !> The law of a case; the depth at which contact points of each counterpart harden, and the overlap
+  !! that each may have at rest, a share of its smallest edge.
+  subroutine response_init(input, blocks, response)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    type(response_t), intent(out) :: response
+    integer :: b
+
+    call choose_law(input, response%law)
+    allocate (response%hard(bed_counterpart:blocks%n), &
+      response%rest_overlap(bed_counterpart:blocks%n), source=huge(1.0_wp))
+    do b = 1, blocks%n
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        response%hard(b) = hard_depth(shape)
+        response%rest_overlap(b) = rest_overlap_share*shape%smallest_edge
+      end associate
+    end do
+  end subroutine response_init
 
   !> Stiffness and damping of all contact points.
   subroutine respond(points, counterparts, response)
@@ -78,8 +104,8 @@ contains
       of_b = inertia_of(counterparts, b)
       k = law%normal_constant(1.0_wp/(of_a%inverse_mass + of_b%inverse_mass), &
         counterparts%heaviest, counterparts%gravity, &
-        min(counterparts%rest_overlap(a), counterparts%rest_overlap(b)))
-      hard = min(counterparts%hard(a), counterparts%hard(b))
+        min(response%rest_overlap(a), response%rest_overlap(b)))
+      hard = min(response%hard(a), response%hard(b))
       weights = 0.0_wp
       centres = 0.0_wp
       steep = 0.0_wp

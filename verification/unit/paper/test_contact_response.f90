@@ -30,8 +30,8 @@ contains
     type(contact_input_t) :: input
 
     input%restitution = 0.3_wp
+    call free_bodies(mass, counterparts, response)
     call choose_law(input, response%law)
-    call free_bodies(mass, counterparts)
   end subroutine make_balls
 
   !> So many contact points between balls a and b along z.
@@ -101,13 +101,13 @@ contains
 
     counterparts%heaviest = 1.0e9_wp
     counterparts%gravity = 10.0_wp
-    counterparts%rest_overlap(1) = 1.0e-2_wp
+    response%rest_overlap(1) = 1.0e-2_wp
     call add_ball_points(2, 1, 1, points)
     call respond(points, counterparts, response)
     call check('stiffness under a load', response%k(1), 1.0e12_wp, 1.0_wp)
     counterparts%heaviest = 0.0_wp
     counterparts%gravity = 0.0_wp
-    counterparts%rest_overlap = 1.0_wp
+    response%rest_overlap = 1.0_wp
   end subroutine check_load
 
 end module test_contact_response_m

@@ -13,10 +13,9 @@ module springs_m
   use lubrication_m, only: lubricate
   use counterparts_m, only: update_motion, update_inertia
   use displacements_m, only: displacements_t, reserve_displacements
-  use contact_points_m, only: form_groups, keep_touching
+  use contact_groups_m, only: form_groups, keep_touching
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
-  use contact_laws_m, only: choose_law
-  use contact_response_m, only: response_t, respond, stiffness_limit
+  use contact_response_m, only: response_t, response_init, respond, stiffness_limit
   use contact_forces_m, only: match_displacements, integrate_displacements, sum_groups, &
     elastic_energy
   use contact_solver_m, only: contact_solver_t, contact_report_t, start_solver, equal_substep, &
@@ -55,7 +54,7 @@ contains
 
     call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
     call start_solver(input, blocks, contacts%spheres%bounding_radius, contacts)
-    call choose_law(input, contacts%response%law)
+    call response_init(input, blocks, contacts%response)
     contacts%contact_time = input%contact_time
     contacts%courant_max = input%courant_max
     contacts%substep_ratio = input%substep_ratio

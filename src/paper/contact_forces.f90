@@ -4,7 +4,8 @@ module contact_forces_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
-  use contact_points_m, only: contact_points_t, groups_t
+  use contact_points_m, only: contact_points_t
+  use contact_groups_m, only: groups_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use counterparts_m, only: counterparts_t, motion_t, wrench_t, motion_between, &
     relative_velocity, act
