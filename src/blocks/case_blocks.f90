@@ -39,7 +39,7 @@ contains
       blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
     allocate (blocks%exit_time(n), blocks%record%impact_speed(n), blocks%record%rest_since(n), &
       source=0.0_wp)
-    allocate (blocks%record%hardest(n), source=0.0_wp)
+    allocate (blocks%record%hardest(n), blocks%record%peak(n), source=0.0_wp)
     allocate (blocks%record%approach(3, n), source=0.0_wp)
     allocate (blocks%name(n), blocks%handling(n))
     allocate (blocks%planned(2, n), source=0.0_wp)

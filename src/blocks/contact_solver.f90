@@ -21,6 +21,7 @@ module contact_solver_m
   type :: loads_t
     real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
+    real(wp), allocatable :: peak(:)                     !! (n) largest force in the step [N]
   end type loads_t
 
   !> What happened in the substeps of one fluid step.
@@ -102,7 +103,7 @@ contains
     associate (loads => contacts%loads, n => blocks%n)
       allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
         loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), source=0.0_wp)
-      allocate (contacts%share(n), contacts%steady(6, n), source=0.0_wp)
+      allocate (contacts%share(n), contacts%steady(6, n), loads%peak(n), source=0.0_wp)
     end associate
     call sleep_init(input%sleep, bounding_radius, contacts%sleep)
     call reserve_displacements(1, contacts%displacements)

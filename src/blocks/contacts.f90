@@ -1,6 +1,7 @@
 !> The motion of the blocks through a fluid step, in which they touch.
 module contacts_m
   use kinds_m, only: wp
+  use vectors_m, only: norms
   use rigid_body_m, only: blocks_t, begin_step, hold_sleepers, look_ahead, follow_motions, &
     fastest_point
   use walls_m, only: walls_t, floor_wall
@@ -72,6 +73,7 @@ contains
     end associate
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
+    contacts%loads%peak = 0.0_wp
     contacts%met%n = 0
     call update_counterparts(walls, gravity, blocks, contacts%counterparts)
     if (.not. contacts%sleep%active) return
@@ -97,6 +99,10 @@ contains
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
+    associate (peak => contacts%loads%peak)
+      where (blocks%asleep) peak = max(peak, norms(blocks%contact_force))
+      blocks%record%peak = max(blocks%record%peak, peak)
+    end associate
     blocks%contacts = 0
     blocks%on_floor = 0
     do m = 1, contacts%met%n

@@ -396,17 +396,20 @@ contains
     if (yes) yes = rows%inverse_mass(b) > 0.0_wp
   end function yields
 
-  !> Mean forces and torques of the step on all counterparts.
-  pure subroutine sum_loads(step, rows, force, torque)
+  !> Mean forces and torques of the step on all counterparts, and the change of these forces where
+  !! the impulse of an impact acts for a contact time, not for the step.
+  pure subroutine sum_loads(step, rows, force, torque, spread)
     real(wp), intent(in) :: step                                   !! [s]
     type(rows_t), intent(in) :: rows
     real(wp), intent(inout) :: force(:, bed_counterpart:), torque(:, bed_counterpart:)
       !! (3, counterparts) [N], [N m]
+    real(wp), intent(inout) :: spread(:, bed_counterpart:)   !! (3, counterparts) [N]
     real(wp) :: p(3)
     integer :: k, r
 
     force = 0.0_wp
     torque = 0.0_wp
+    spread = 0.0_wp
     do k = 1, rows%n_pairs
       associate (a => rows%a(k), b => rows%b(k))
         do r = rows%first(k), rows%first(k + 1) - 1
@@ -416,6 +419,11 @@ contains
             force(:, b) = force(:, b) + p
             torque(:, a) = torque(:, a) - cross(row%arm_a, p)
             torque(:, b) = torque(:, b) + cross(row%arm_b, p)
+            if (.not. rows%impact) cycle
+            p = in_space(rows%gained(:, r) + rows%returned(:, r), row) &
+              *(1.0_wp/rows%contact_time - 1.0_wp/step)
+            spread(:, a) = spread(:, a) - p
+            spread(:, b) = spread(:, b) + p
           end associate
         end do
         torque(:, a) = torque(:, a) + rows%turn(:, k)/step

@@ -37,6 +37,7 @@ module impulse_step_m
     type(contact_surface_t) :: surface
     type(rows_t) :: rows
     real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films of liquid [N]
+    real(wp), allocatable :: spread(:, :)    !! (3, counterparts) see `sum_loads` [N]
     real(wp), allocatable :: gain(:)         !! (n) work: speed gained in free fall [m/s]
     real(wp) :: restitution = 0.0_wp         !! [-]
     real(wp) :: smallest_edge = 0.0_wp       !! of all blocks [m]
@@ -57,7 +58,8 @@ contains
     call start_solver(input, blocks, contacts%surface%bounding_radius, contacts)
     contacts%exact = .true.
     call rows_init(input, blocks%n, contacts%rows)
-    allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), source=0.0_wp)
+    allocate (contacts%film(3, bed_counterpart:blocks%n), contacts%gain(blocks%n), &
+      contacts%spread(3, bed_counterpart:blocks%n), source=0.0_wp)
     contacts%restitution = input%restitution
     if (blocks%n > 0) contacts%smallest_edge &
       = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)])
@@ -226,7 +228,7 @@ contains
           contacts%restitution, slow_hit*norm(gravity)*step, n, rows)
         if (n < asked) step = h*real(n, wp)   ! else rounding would leave a step of no length
       end if
-      call sum_loads(step, rows, loads%force, loads%torque)
+      call sum_loads(step, rows, loads%force, loads%torque, contacts%spread)
       loads%force = loads%force + contacts%film
     end associate
   end subroutine solve_step
@@ -255,6 +257,9 @@ contains
           call drift_body(step, b, blocks)
           call kick_body(gravity, 0.5_wp*step, force, contacts%steady(4:6, b), b, blocks)
         end if
+      end do
+      do b = 1, blocks%n
+        loads%peak(b) = max(loads%peak(b), norm(loads%force(:, b) + contacts%spread(:, b)))
       end do
       loads%impulse = loads%impulse + step*loads%force
       loads%twist = loads%twist + step*loads%torque

@@ -33,6 +33,7 @@ module rigid_body_m
   !> What the results keep of the blocks between rows (`block_record_m`).
   type :: record_t
     real(wp), allocatable :: hardest(:)        !! (n) largest contact force since the last row [N]
+    real(wp), allocatable :: peak(:)           !! (n) the same within a step [N]
     real(wp), allocatable :: impact_speed(:)   !! (n) before the first touch, 0: none yet [m/s]
     real(wp), allocatable :: rest_since(:)     !! (n) [s], 0: it moves
     real(wp), allocatable :: approach(:, :)

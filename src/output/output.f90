@@ -282,6 +282,7 @@ contains
       if (.not. (row .and. clock%rows%due(clock%t))) return
       call clock%rows%done(clock%t)
       state%blocks%record%hardest = 0.0_wp
+      state%blocks%record%peak = 0.0_wp
     end associate
   end subroutine write_moment
 

@@ -164,6 +164,7 @@ contains
     call list%add('/blocks/contacts', blocks%contacts)
     call list%add('/blocks/on_floor', blocks%on_floor)
     call list%add('/blocks/hardest', 'N', blocks%record%hardest)
+    call list%add('/blocks/peak', 'N', blocks%record%peak)
     call list%add('/blocks/impact_speed', 'm/s', blocks%record%impact_speed)
     call list%add('/blocks/rest_since', 's', blocks%record%rest_since)
     call list%add('/blocks/approach', 'm, m/s', blocks%record%approach)

@@ -119,6 +119,7 @@ contains
       call self%column('/bodies/contact_force', 'N', [blocks%contact_force], 3)
       call self%column('/bodies/contact_torque', 'N m', [blocks%contact_torque], 3)
       call self%column('/bodies/contact_force_max', 'N', blocks%record%hardest)
+      call self%column('/bodies/contact_force_peak', 'N', blocks%record%peak)
       call self%column('/bodies/quaternion', '1', [self%q], 4)
       call self%column('/bodies/contacts', '1', real(blocks%contacts, wp), kind=as_integer)
       call self%column('/bodies/on_floor', '1', real(blocks%on_floor, wp), kind=as_integer)

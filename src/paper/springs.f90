@@ -282,6 +282,7 @@ contains
         associate (b => acting(k))
           loads%impulse(:, b) = loads%impulse(:, b) + dt_b*(loads%force(:, b) - support(1:3, b))
           loads%twist(:, b) = loads%twist(:, b) + dt_b*(loads%torque(:, b) - support(4:6, b))
+          loads%peak(b) = max(loads%peak(b), norm(loads%force(:, b)))
           call kick_body(none, dt_b, contacts%share(b)*loads%force(:, b), loads%torque(:, b), b, &
                          blocks)
           call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(1:3, b), contacts%steady(4:6, b), &

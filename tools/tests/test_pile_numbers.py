@@ -36,7 +36,7 @@ def test_stacked_cubes(make_run) -> None:
     assert 0 < found.impact_speed < 1.5 * 0.2 / area[-1]
     assert found.attitude_randomness == pytest.approx(0.0, abs=1e-9)
     forces = np.linalg.norm(run.bodies.contact_force[:, 3:], axis=2)
-    assert found.contact_force == pytest.approx(forces.max())
+    assert found.contact_force == found.peak_force == pytest.approx(forces.max())
     low, high = np.array(found.box[:3]), np.array(found.box[3:])
     assert low == pytest.approx((0.02, 0.02, 0.0))
     assert found.porosity == pytest.approx(1 - 7 * EDGE**3 / np.prod(high - low))
@@ -113,8 +113,8 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     assert mics_tools(["pile", str(run.folder)]) == 0
     content = json.loads((run.folder / "pile.json").read_text())
     assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
-        "time_to_rest": "s", "impact_speed": "m/s", "contact_force": "N", "slopes": "deg",
-        "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
+        "time_to_rest": "s", "impact_speed": "m/s", "contact_force": "N", "peak_force": "N",
+        "slopes": "deg", "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
         "footprint": "m2"}  # fmt: skip
     corners = np.concatenate(content["outline"])
     assert len(content["outline"]) == 4

@@ -133,6 +133,7 @@ def _facts(run: Run, found: Found) -> Markup:
             ("contacts per block", f"{n.coordination:.2f}", "with other blocks"),
             ("fastest first impact", shown.speed.text(n.impact_speed), "of a free block"),
             ("hardest contact", shown.force.text(n.contact_force), blow),
+            ("hardest impact", shown.force.text(n.peak_force), "impulse over contact_time"),
         ]
     )  # fmt: skip
 

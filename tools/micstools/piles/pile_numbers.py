@@ -29,6 +29,7 @@ class PileNumbers:
     time_to_rest: float  # [s]; nan where the blocks still move
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
     contact_force: float  # largest on a dropped block, a mean over a step [N]
+    peak_force: float  # the same within a step: an impact's impulse over contact_time [N]
     slopes: tuple[float, float, float, float]  # of the sides towards -x, +x, -y, +y [degrees]
     attitude_randomness: float  # of the free blocks of the commonest shape; 0 alike, 1 random
     porosity: float  # of the box, above the bed
@@ -45,9 +46,9 @@ class PileNumbers:
 
 KINDS = {
     "plan_area": "area", "top": "place", "centre": "place", "spread": "length",
-    "time_to_rest": "time", "impact_speed": "speed", "contact_force": "force", "slopes": "angle",
-    "box": "place", "height": "length", "layer_thickness": "length", "footprint": "area",
-    "thickness_ball": "length",
+    "time_to_rest": "time", "impact_speed": "speed", "contact_force": "force",
+    "peak_force": "force", "slopes": "angle", "box": "place", "height": "length",
+    "layer_thickness": "length", "footprint": "area", "thickness_ball": "length",
 }  # fmt: skip
 """What the numbers that have a unit are, as `Units` names it."""
 
@@ -98,7 +99,7 @@ def numbers(
     measured = layer.of_run(run, row)
     found = measured[1] if measured else None
     ball = found.ball if found else layer.Surface(*[float("nan")] * 3)
-    forces = [k.contact_force for k in block_numbers.of_blocks(run)]
+    struck = block_numbers.of_blocks(run)
     return PileNumbers(
         blocks=len(bodies),
         on_floor=sum(seen.on_floor(int(k)) for k in b.dropped),
@@ -109,7 +110,8 @@ def numbers(
         spread=(float(place[:, 0].std()), float(place[:, 1].std())),
         time_to_rest=time_to_rest(run),
         impact_speed=impact_speed(run),
-        contact_force=max(forces, default=float("nan")),
+        contact_force=max((k.contact_force for k in struck), default=float("nan")),
+        peak_force=max((k.peak_force for k in struck), default=float("nan")),
         slopes=pile_form.slopes(top, float(run.grid.low[2]), step),
         attitude_randomness=_randomness(run, row),
         porosity=pile_form.porosity(blocks, low, high, bed_volume(run, low, high, step)),

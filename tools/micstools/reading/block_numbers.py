@@ -18,6 +18,7 @@ class BlockNumbers:
     at_rest: float  # after which it stays where it ends [s]
     impact_speed: float  # before its first touch, the largest over a quarter of its length [m/s]
     contact_force: float  # the largest, a mean over a step [N]
+    peak_force: float  # the largest within a step: an impact's impulse over contact_time [N]
     fluid_force: float  # the largest, buoyancy included [N]
     weight: float  # [N]
     turned: float  # from its attitude at the release to that at the end [degrees]
@@ -41,6 +42,7 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
         at_rest=rest.of_block(run, k).time,
         impact_speed=float(b.impact_speed[k]),
         contact_force=_largest(b.contact_force_max[start:, k, None]),
+        peak_force=_largest(b.contact_force_peak[start:, k, None]),
         fluid_force=_largest(b.fluid_force[start:, k]),
         weight=float(b.mass[k] * np.linalg.norm(run.gravity)),
         turned=float(attitude_change_deg(b.quaternion[-1, k], b.quaternion[start, k])),

@@ -102,6 +102,7 @@ class Bodies:
     contact_force: Array  # (T, N, 3) [N]
     contact_torque: Array  # (T, N, 3) [N m]
     contact_force_max: Array  # (T, N) largest mean of a step since the row before [N]
+    contact_force_peak: Array  # (T, N) the same within a step, an impact over contact_time [N]
     contacts: IntArray  # (T, N) different counterparts touched
     on_floor: IntArray  # (T, N)
 
@@ -516,7 +517,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     drops."""
     group = h5["bodies"]
     per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED, *_KEPT)
-    rows = [f.name for f in fields(Bodies) if f.name not in (*per_body, "contact_force_max")]
+    rows = [f.name for f in fields(Bodies) if f.name not in (*per_body, *_LARGEST)]
     mass = finite(numbers(group, "mass", None), "mass")
     n = len(mass)
     if not (mass > 0).all():
@@ -533,17 +534,17 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     names = [_text(name) for name in group.get("name", [""] * n)]
     if len(shape) != n or len(names) != n or not set(shape) <= set(h5.get("shapes", {})):
         raise ValueError("bodies and shapes do not belong together")
-    hardest = np.linalg.norm(values["contact_force"], axis=2)
-    if "contact_force_max" in group:
-        require_shape(group, "contact_force_max", None, n)
-        hardest = np.maximum(hardest, _thinned(group["contact_force_max"], complete, step))
+    for name in _LARGEST:  # older programs wrote the means at the rows alone
+        values[name] = np.linalg.norm(values["contact_force"], axis=2)
+        if name in group:
+            require_shape(group, name, None, n)
+            values[name] = _thinned(group[name], complete, step)
     return Bodies(
         shape=shape,
         name=names,
         mass=mass,
         fixed=numbers(group, "fixed", n).astype(bool),
         planned=numbers(group, "planned", n, 2) if "planned" in group else np.full((n, 2), np.nan),
-        contact_force_max=hardest,
         impact_speed=_kept(group, "impact_speed", n),
         rest_since=_kept(group, "rest_since", n),
         **_handled(group, values, placed),
@@ -551,6 +552,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     )
 
 
+_LARGEST = ("contact_force_max", "contact_force_peak")
 _KEPT = ("impact_speed", "rest_since")
 """Numbers of each body that the program keeps; 0: there is none yet."""
 
