@@ -16,6 +16,7 @@ module simulation_m
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, lowering, kinetic_energy, potential_energy
+  use sling_m, only: hangs
   use case_blocks_m, only: blocks_init, turn_with_fluid
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
@@ -81,7 +82,7 @@ contains
     call grid_init(case%grid, case%boundary, sim%grid)
     call walls_init(case%grid, case%boundary, sim%walls)
     sim%walls%bed => bed
-    call blocks_init(case, shapes, sim%blocks)
+    call blocks_init(case, shapes, sim%blocks, bed)
     call choose_contact(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
@@ -161,9 +162,15 @@ contains
   !> What follows from the state after it was read: solids in the grid, density, halos, outflows.
   subroutine resume(sim)
     type(simulation_t), intent(inout) :: sim
+    integer :: b
 
     where (sim%blocks%handling%lowering_speed > 0.0_wp) sim%blocks%fixed = &
       sim%blocks%status == lowering
+    do b = 1, sim%blocks%n
+      if (.not. hangs(b, sim%blocks)) cycle
+      sim%blocks%fixed(b) = .false.
+      sim%blocks%inverse_inertia(:, :, b) = 0.0_wp
+    end do
     if (sim%clock%step > 0) sim%initialised = sim%blocks%present
     if (sim%light%on .and. sim%clock%step > 0) call resume_light(sim%blocks, sim%light)
     if (.not. sim%wet) return

@@ -239,11 +239,28 @@ def test_lowered_to_a_height_or_a_place(tmp_path: Path) -> None:
     assert list(bodies["status"]) == [2, 2]
 
 
-def test_lowered_in_water_and_again_after_a_restart(tmp_path: Path) -> None:
+def test_set_down_on_a_slope(tmp_path: Path) -> None:
+    """A tetrapod with its base on a slope of 1:2 stays; let go upright it rolls; it slides on a bed
+    of which the check tells that it is too smooth."""
+    (tmp_path / "slope.txt").write_text("2 2 0 0 0.12 0.12\n0 0.06 0 0.06\n")
+    steep = "100 % of it is steeper than the 21.8 degrees that friction = 0.4 holds"
+    for mu, how in ((0.8, "'set_down'  attitude = 'bed'"), (0.8, "'touch'"), (0.4, "'set_down'")):
+        drop = (
+            f"&bed file = 'slope.txt'  friction = {mu} /\n&drop shape = 'tetrapod'  "
+            f"position = 0.06, 0.06, 0.12  lowering_speed = 0.2  release = {how} /"
+        )
+        case = crane(tmp_path, drop, end=1.0)
+        way = np.hypot(*(run(tmp_path, case)[0]["position"][-1, 0, :2] - 0.06))
+        assert way < 1e-4 if "bed" in how else way > 0.01
+        assert (steep in mics(["--check", case], tmp_path).stdout) == (mu < 0.5)
+
+
+@pytest.mark.parametrize("release", ["touch", "set_down"])
+def test_lowered_in_water_and_again_after_a_restart(release: str, tmp_path: Path) -> None:
     """The flow meets the held block as a moving body; a restart in the middle changes no bit."""
     drop = (
         "&drop shape = 'tetrapod'  position = 0.06, 0.06, 0.14  lowering_speed = 0.4 "
-        "release = 'touch' /"
+        f"release = '{release}' /"
     )
     case = Path(crane(tmp_path, drop, end=0.4, physics="coupled")).read_text()
     case = case.replace("restart_interval = 0", "restart_interval = 0.2")

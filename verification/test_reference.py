@@ -260,7 +260,7 @@ def test_an_unknown_name_ends_the_program(schema: dict[str, Any]) -> None:
     choices = {name for group in schema["$defs"].values() for name, rule in
                group["properties"].items() if "enum" in rule and name not in SIDES}  # fmt: skip
     # advection by `scheme_of`, the model by the solver, others by `if`
-    assert choices - stops == {"advection", "if_blocked", "release", "model"}
+    assert choices - stops == {"advection", "attitude", "if_blocked", "release", "model"}
 
 
 @pytest.mark.parametrize(

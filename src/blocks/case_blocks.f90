@@ -3,13 +3,15 @@ module case_blocks_m
   use kinds_m, only: wp
   use case_types_m, only: case_t, place_t, handling_t, is_given
   use boundary_kinds_m, only: side_code, is_wall
-  use vectors_m, only: rotation_matrix, inverse3
+  use vectors_m, only: rotation_matrix, inverse3, quaternion_from_axis, quaternion_product
+  use bed_m, only: bed_t
+  use bed_measure_m, only: bed_normal
   use tet_mesh_m, only: shape_t, extent_along
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use rigid_body_m, only: blocks_t, release_body, to_come
   implicit none
   private
-  public :: height_at_level, blocks_init, turn_with_fluid, turning_share
+  public :: height_at_level, attitude_on, blocks_init, turn_with_fluid, turning_share
 
   real(wp), parameter :: turning_share = 0.02_wp
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
@@ -18,10 +20,11 @@ module case_blocks_m
 contains
 
   !> The bodies of a case at their starting poses; those of `&body` due at t = 0 are released.
-  subroutine blocks_init(case, shapes, blocks)
+  subroutine blocks_init(case, shapes, blocks, bed)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(blocks_t), intent(out) :: blocks
+    type(bed_t), intent(in), optional :: bed   !! on whose slope some lie
     integer :: b, i, k, n
 
     blocks%n = size(case%body)
@@ -36,7 +39,7 @@ contains
     allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
       source=.false.)
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
-      blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
+      blocks%raised(n), blocks%goal(n), blocks%sling(n), blocks%speed(n), source=0.0_wp)
     allocate (blocks%exit_time(n), blocks%record%impact_speed(n), blocks%record%rest_since(n), &
       source=0.0_wp)
     allocate (blocks%record%hardest(n), blocks%record%peak(n), source=0.0_wp)
@@ -65,7 +68,7 @@ contains
       do k = 1, case%drop(i)%count
         b = b + 1
         blocks%handling(b) = case%drop(i)%handling
-        call put_block(case, place_of_block(case%drop(i), k), b, blocks)
+        call put_block(case, place_of_block(case%drop(i), k), b, blocks, bed)
       end do
     end do
     call begin_where_left(case, blocks)
@@ -74,11 +77,12 @@ contains
   !> Block b where it is placed, before its release. One that is lowered to its place, or to what
   !! lies there, begins with its lowest point at the level of the water; one that is set on what
   !! lies there at once waits over the tank.
-  subroutine put_block(case, place, b, blocks)
+  subroutine put_block(case, place, b, blocks, bed)
     type(case_t), intent(in) :: case
     type(place_t), intent(in) :: place
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
+    type(bed_t), intent(in), optional :: bed
 
     blocks%shape(b) = shape_of_place(place, blocks%shapes)
     blocks%name(b) = place%name
@@ -89,6 +93,8 @@ contains
     blocks%x(:, b) = place%x
     blocks%planned(:, b) = place%planned
     blocks%q(:, b) = place%q
+    if (present(bed)) blocks%q(:, b) = attitude_on(bed, blocks%handling(b), place, &
+      blocks%shapes(blocks%shape(b)))
     if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
     associate (shape => blocks%shapes(blocks%shape(b)), handling => blocks%handling(b))
       blocks%mass(b) = shape%density*shape%volume
@@ -103,6 +109,23 @@ contains
         height_at_level(case, shape, blocks%q(:, b), handling%lowering_speed > 0.0_wp))
     end associate
   end subroutine put_block
+
+  !> Attitude of a block at its place: as given, or turned from that so that what is level lies on the
+  !! slope of the bed below it.
+  pure function attitude_on(bed, handling, place, shape) result(q)
+    type(bed_t), intent(in) :: bed
+    type(handling_t), intent(in) :: handling
+    type(place_t), intent(in) :: place
+    type(shape_t), intent(in) :: shape
+    real(wp) :: q(4)
+    real(wp) :: n(3)
+
+    q = place%q
+    if (handling%attitude == 'given' .or. .not. bed%there) return
+    n = bed_normal(bed, place%x(:2), shape%radius)
+    if (any(abs(n(:2)) > 0.0_wp)) q = quaternion_product(quaternion_from_axis( &
+      [-n(2), n(1), 0.0_wp], atan2(hypot(n(1), n(2)), n(3))), q)
+  end function attitude_on
 
   !> Height of the centre of a shape whose lowest point is at the level of the water, or at the top
   !! of the tank where there is none or none is asked for; below a lid it touches that at most [m].

@@ -6,6 +6,7 @@ module contacts_m
     fastest_point
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_counterpart
+  use sling_m, only: hangs, pull_sling
   use sleep_m, only: update_stillness, store_quiet, all_still
   use counterparts_m, only: update_counterparts
   use contact_solver_m, only: contact_solver_t, contact_report_t
@@ -68,6 +69,8 @@ contains
         share(b) = blocks%mass(b)/(blocks%mass(b) + blocks%added_mass(b))
         contacts%steady(1:3, b) = blocks%fluid_force(:, b) - blocks%film_force(1:3, b) &
           + (1.0_wp - share(b))*blocks%contact_force(:, b)
+        if (hangs(b, blocks)) call pull_sling(-contacts%steady(3, b) - blocks%mass(b)*gravity(3), &
+          dt, b, blocks)
         contacts%steady(4:6, b) = blocks%fluid_torque(:, b) - blocks%film_force(4:6, b)
       end do
     end associate

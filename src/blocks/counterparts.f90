@@ -10,7 +10,7 @@ module counterparts_m
   public :: counterparts_t, inertia_t, motion_t, wrench_t
   public :: counterparts_init, update_counterparts, update_motion, update_inertia
   public :: inertia_of, inverse_effective_mass, act
-  public :: motion_between, relative_velocity
+  public :: motion_between, relative_velocity, kind_of
 
   !> What may touch: bodies (1..n), walls (-6..-1) and the bed (`bed_counterpart`) alike.
   type :: counterparts_t
@@ -41,6 +41,13 @@ module counterparts_m
   end type wrench_t
 
 contains
+
+  !> What a counterpart is: 1 a body, 2 a wall, 3 the bed.
+  elemental integer function kind_of(b)
+    integer, intent(in) :: b
+
+    kind_of = merge(1, merge(3, 2, b == bed_counterpart), b > 0)
+  end function kind_of
 
   !> Room for the walls and n bodies.
   pure subroutine counterparts_init(n, counterparts)

@@ -13,7 +13,7 @@ module impulse_rows_m
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
-  use counterparts_m, only: counterparts_t
+  use counterparts_m, only: counterparts_t, kind_of
   implicit none
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
@@ -40,7 +40,7 @@ module impulse_rows_m
   end type row_t
 
   type :: rows_t
-    real(wp) :: friction = 0.0_wp, wall_friction = 0.0_wp   !! Coulomb, block on block, on wall [-]
+    real(wp) :: friction(3) = 0.0_wp              !! Coulomb, see `kind_of` [-]
     real(wp) :: contact_time = 0.0_wp             !! [s]
     integer :: n = 0
     type(row_t), allocatable :: row(:)
@@ -101,8 +101,7 @@ contains
     integer, intent(in) :: n                      !! bodies
     type(rows_t), intent(out) :: rows
 
-    rows%friction = input%friction
-    rows%wall_friction = input%wall_friction
+    rows%friction = [input%friction, input%wall_friction, input%bed_friction]
     rows%contact_time = input%contact_time
     allocate (rows%v(6, bed_counterpart:n), rows%v_start(6, bed_counterpart:n), source=0.0_wp)
     allocate (rows%way(6, bed_counterpart:n), rows%a_free(6, bed_counterpart:n), &
@@ -147,7 +146,7 @@ contains
         rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
           gap=-point%depth, gap_start=-point%depth, &
           lever_a=cross(point%arm_a, point%normal), lever_b=cross(point%arm_b, point%normal), &
-          friction=merge(rows%wall_friction, rows%friction, point%b < 0))
+          friction=rows%friction(kind_of(point%b)))
         call weigh(point%a, point%b, counterparts, rows, rows%row(r))
         call recall(point, h, memory, m, rows%row(r))
         associate (row => rows%row(r))

@@ -204,6 +204,7 @@ contains
         call update_inertia(blocks, there, contacts%counterparts)
       end associate
       contacts%film = 0.0_wp
+      contacts%film(3, 1:) = blocks%sling
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
         contacts%lubrication, contacts%film)
       call make_rows(h, contacts%points, contacts%counterparts, blocks, &

@@ -76,8 +76,8 @@ contains
           b = near%b(p)
           d = blocks%x(:, a) - blocks%x(:, b)
           d = d + nearest_shift(walls%period, d)
-          associate (r_a => lubrication%radius(a), r_b => lubrication%radius(b), &
-            n => d/max(norm(d), tiny(1.0_wp)))
+          n = d/max(norm(d), tiny(1.0_wp))
+          associate (r_a => lubrication%radius(a), r_b => lubrication%radius(b))
             opening = dot_product(n, blocks%v(:, a) - blocks%v(:, b))
             f = push(lubrication, r_b*r_a/(r_b + r_a), n, norm(d) - r_b - r_a + ahead*opening, &
                      opening, inverse_mass(blocks, b) + inverse_mass(blocks, a), dt)*n

@@ -13,7 +13,7 @@ module near_features_m
   implicit none
   private
   public :: near_features_t, near_vertices_t, search_t, list_features, list_bed
-  public :: append_facets, append_edges, edge_in_view, way_to_crossing
+  public :: edge_in_view
   public :: poses_t, view_t, meeting_t
   public :: update_views, seen_from, box_in_view, way_between, closes
 

@@ -64,6 +64,7 @@ module rigid_body_m
     type(handling_t), allocatable :: handling(:)     !! (n) by the crane
     logical, allocatable :: on_ground(:)         !! (n) its height is found at the release
     real(wp), allocatable :: goal(:)             !! (n) height to which it is lowered at most [m]
+    real(wp), allocatable :: sling(:)            !! (n) force of a sling on what hangs in it [N]
     type(given_t) :: given                       !! at release; of fixed bodies for ever
     type(given_motion_t), allocatable :: path(:) !! (n) that moves a fixed body; 0 rows: none
     real(wp) :: time = 0.0_wp                    !! at which the bodies are where they are [s]

@@ -15,6 +15,7 @@ module sleep_m
   use kinds_m, only: wp
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
+  use sling_m, only: hangs
   use displacements_m, only: displacements_t, reserve_displacements
   implicit none
   private
@@ -140,7 +141,7 @@ contains
     type(sleep_t), intent(in) :: sleep
     logical :: yes
 
-    yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
+    yes = .not. (blocks%still(b) .or. hangs(b, blocks)) .and. sleep%quiet(b) > 0.0_wp
     if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%bounding_radius(b)
   end function may_sleep
 

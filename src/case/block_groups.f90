@@ -74,7 +74,8 @@ contains
     call v%real('friction', contact%friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on block', example='0.5')
     call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
-      'coefficient of Coulomb friction, block on wall and bed', example='0.5')
+      'coefficient of Coulomb friction, block on wall, and on the bed but for &bed friction', &
+      example='0.5')
     call v%real('substep_ratio', contact%substep_ratio, share, &
       'longest step of the blocks over that of the run, with springs', &
       example=spheres//'substep_ratio = 0.02')
@@ -98,6 +99,8 @@ contains
       example='''mound.txt''')
     call v%option('kind', bed%kind, 'heightmap stl', 'what the file holds: a map of heights, or ' &
       //'triangles in m', example='file = ''slope.stl''  kind = ''stl''')
+    call v%real('friction', bed%friction, not_negative('-'), 'coefficient of Coulomb friction, ' &
+      //'block on bed; by default wall_friction', example='file = ''mound.txt''  friction = 0.7')
     call v%require('file', len_trim(bed%file) > 0, 'must name a file with the form of the bed')
     call v%judge('file kind', bed%faulty)
   end subroutine visit_bed
@@ -364,10 +367,11 @@ contains
         not_negative('m/s', zero='0 means let go at once'), &
         'the block is held and lowered at this speed until its release', example='0.1')
       lowered = handling%lowering_speed > 0.0_wp .or. .not. v%good('lowering_speed')
-      call v%option('release', handling%release, 'place height touch', 'where a lowered block is ' &
+      call v%option('release', handling%release, 'place height touch set_down', 'where a lowered block is ' &
         //'let go: at its place, to which it comes from the water level (without one the top of ' &
         //'the tank); or, lowered from its place, at release_height over what lies below, or ' &
-        //'where it touches that', example='lowering_speed = 0.1  release = ''touch''')
+        //'where it touches that; or set down there: its sling holds it upright until it carries ' &
+        //'less than 5 % of the weight under water', example='lowering_speed = 0.1  release = ''touch''')
       call v%require('release', lowered .or. handling%release == 'place', &
         'needs lowering_speed above 0')
       call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
@@ -378,6 +382,9 @@ contains
       call v%real('release_height', handling%release_height, not_negative('m'), &
         'how far above what lies below a lowered block is let go', &
         example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
+      call v%option('attitude', handling%attitude, 'given bed', 'as given, or turned from that ' &
+        //'so that what is level lies on the slope of the bed below (''bed'', where there is one)', &
+        example='''given''')
     end subroutine visit_handling
   end subroutine visit_drop
 

@@ -77,6 +77,8 @@ contains
     end do
     call check_together(list, case, v)
     call name_members(case)
+    case%contact%bed_friction = merge(case%bed%friction, case%contact%wall_friction, &
+      is_given(case%bed%friction))
     problems = v%problems
     if (present(passed_over)) passed_over = v%passed_over
     if (case%run%physics /= 'fluid') return
@@ -204,6 +206,14 @@ contains
     call check_streams()
     if (case%run%physics == 'light') call check_given_water()
     call find_idle()
+    d = 0
+    do i = 1, size(list)
+      if (list(i)%name /= 'drop') cycle
+      d = d + 1
+      call v%start(list(i))
+      call v%require('attitude', case%drop(d)%handling%attitude == 'given' &
+        .or. len_trim(case%bed%file) > 0, 'needs a &bed')
+    end do
     i = first_of(list, 'grid')
     if (i == 0 .or. case%grid%cells_faulty) return
     call v%start(list(i))

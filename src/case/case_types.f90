@@ -95,6 +95,7 @@ module case_types_m
     real(wp) :: k_n = 1.0e5_wp, gamma_n = 1.0_wp, eta_n = 10.0_wp   !! [N/m^gamma, -, N s/m]
     real(wp) :: k_t = 1.0e5_wp, gamma_t = 1.0_wp, eta_t = 10.0_wp
     real(wp) :: friction = 0.6_wp, wall_friction = 0.4_wp
+    real(wp) :: bed_friction = 0.4_wp               !! of `&bed`, or `wall_friction`
     real(wp) :: substep_ratio = 0.05_wp             !! of the paper
     real(wp) :: courant_max = 0.1_wp                !! C_s of eq. (6)
     logical :: sleep = .true.
@@ -152,8 +153,9 @@ module case_types_m
   type :: handling_t
     character(name_length) :: if_blocked = 'wait'   !! 'wait', 'raise' or 'skip'
     real(wp) :: lowering_speed = 0.0_wp             !! [m/s]
-    character(name_length) :: release = 'place'     !! 'place', 'height' or 'touch'
+    character(name_length) :: release = 'place'     !! 'place', 'height', 'touch' or 'set_down'
     real(wp) :: release_height = 0.0_wp             !! [m]
+    character(name_length) :: attitude = 'given'    !! 'given', or 'bed': its base on the slope
   end type handling_t
 
   type, extends(group_t) :: drop_input_t
@@ -193,6 +195,7 @@ module case_types_m
   type, extends(group_t) :: bed_input_t
     character(:), allocatable :: file
     character(name_length) :: kind = 'heightmap'
+    real(wp) :: friction = absent                   !! absent: `wall_friction`
   end type bed_input_t
 
   type :: case_t

@@ -7,7 +7,8 @@
 !!
 !! A block that is lowered comes in the same way, but is held: it moves down at a constant speed
 !! until it is let go at its place, at a height over what lies below, or where it touches that.
-!! Where it touches something earlier, or its sling goes slack, it is let go too.
+!! Where it touches something earlier, or its sling goes slack, it is let go too; or, set down, it
+!! hangs in its sling from the touch on until that is slack (`sling_m`).
 !!
 !! A block that passes an open side is taken out.
 module release_m
@@ -21,6 +22,7 @@ module release_m
     left_out, out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, has_place, exclude
+  use sling_m, only: hang, hangs, let_off, slack_share
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
@@ -28,8 +30,6 @@ module release_m
   public :: take_out
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
-  real(wp), parameter :: slack_share = 0.05_wp
-    !! of the weight of a block: a sling that carries less is slack
 
 contains
 
@@ -113,11 +113,15 @@ contains
     logical, intent(out) :: free
     real(wp) :: height
 
-    if (blocks%on_ground(b) .and. blocks%handling(b)%lowering_speed <= 0.0_wp) then
+    if (blocks%on_ground(b)) then
       height = height_on_top(walls, blocks, b, overlap)
-      free = height > -nothing_below
-      if (.not. free) return
-      blocks%x(3, b) = height
+      if (blocks%handling(b)%lowering_speed > 0.0_wp) then   ! it begins above all that stands there
+        blocks%x(3, b) = max(blocks%x(3, b), height)
+      else
+        free = height > -nothing_below
+        if (.not. free) return
+        blocks%x(3, b) = height
+      end if
     end if
     free = has_place(walls, blocks, b, overlap)
   end subroutine check_place
@@ -139,18 +143,27 @@ contains
     do b = 1, blocks%n
       if (blocks%status(b) /= lowering) cycle
       associate (handling => blocks%handling(b))
+        weight = -own_mass(blocks, b)*gravity(3)
+        carried = weight - blocks%fluid_force(3, b)
+        if (hangs(b, blocks)) then
+          call let_off(carried, time, b, blocks)
+          cycle
+        end if
         gap = ground_gap*blocks%shapes(blocks%shape(b))%smallest_edge
         way = way_down(walls, blocks, b, overlap)
         left = way
         if (handling%release == 'height') left = max(0.0_wp, way - handling%release_height)
         left = min(left, blocks%x(3, b) - blocks%goal(b))
         ! what it lies on carries it, all but a small share of its weight: the sling is slack
-        weight = -own_mass(blocks, b)*gravity(3)
-        carried = weight - blocks%fluid_force(3, b) - blocks%contact_force(3, b)
+        carried = carried - blocks%contact_force(3, b)
         if (time > blocks%entry_time(b) .and. blocks%contact_force(3, b) > 0.0_wp &
             .and. carried < slack_share*weight) left = 0.0_wp
         if (left > gap) then
           if (left < nothing_below) next = min(next, time + left/handling%lowering_speed)
+          cycle
+        end if
+        if (handling%release == 'set_down') then
+          call hang(b, blocks)
           cycle
         end if
         if (handling%release == 'place' .and. blocks%x(3, b) - blocks%goal(b) > gap &

@@ -20,6 +20,7 @@ module light_m
   use boundary_kinds_m, only: side_code, gives_pressure
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_moments_below
+  use sling_m, only: hangs
   use rigid_body_m, only: blocks_t, own_mass, drift, angular_velocity
   use bed_m, only: bed_t
   use bed_measure_m, only: bed_volume
@@ -328,6 +329,7 @@ contains
       blocks%inverse_inertia(:, :, b) = light%inverse(:, :, s) &
         /growth(light, blocks, b, light%wet(b))
     end associate
+    if (hangs(b, blocks)) blocks%inverse_inertia(:, :, b) = 0.0_wp
   end subroutine load_block
 
   !> Buoyancy and drag of block b.

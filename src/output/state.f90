@@ -149,6 +149,8 @@ contains
     call list%add('/blocks/entry_time', 's', blocks%entry_time)
     call list%add('/blocks/exit_time', 's', blocks%exit_time)
     call list%add('/blocks/raised', 'm', blocks%raised)
+    call list%add('/blocks/goal', 'm', blocks%goal)
+    call list%add('/blocks/sling', 'N', blocks%sling)
     call list%add('/blocks/position', 'm', blocks%x)
     call list%add('/blocks/lost', 'm', blocks%lost)
     call list%add('/blocks/quaternion', '1', blocks%q)

@@ -8,7 +8,7 @@ module contact_forces_m
   use contact_groups_m, only: groups_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use counterparts_m, only: counterparts_t, motion_t, wrench_t, motion_between, &
-    relative_velocity, act
+    relative_velocity, act, kind_of
   use contact_response_m, only: response_t
   use contact_solver_m, only: loads_t, contact_report_t, energy_in_memory
   implicit none
@@ -187,7 +187,7 @@ contains
       k = law%tangential_constant(k_n)
       displacements%k(g) = k
       eta = law%tangential_damping(push%eta, k, k_n)
-      bound = push%force*merge(law%wall_friction, law%friction, displacements%b(g) < 0)
+      bound = push%force*law%friction(kind_of(displacements%b(g)))
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
       f = tangential_force(k, law%gamma_t, eta, displacements%xi(:, g), v)/push%slowing

@@ -16,8 +16,7 @@ module contact_law_m
     real(wp) :: gamma_n = 1.0_wp, gamma_t = 1.0_wp   !! powers of the springs [-]
     real(wp) :: damping_ratio = 0.0_wp
       !! zeta of a pair on all its contact points; 0: each by itself
-    real(wp) :: friction = 0.0_wp          !! Coulomb, body on body [-]
-    real(wp) :: wall_friction = 0.0_wp     !! Coulomb, body on wall [-]
+    real(wp) :: friction(3) = 0.0_wp       !! Coulomb: body on body, wall, bed [-]
     real(wp) :: tangential_share = 0.0_wp
       !! tangential over normal stiffness and damping; 0: those that follow [-]
     real(wp) :: k_t = 0.0_wp, eta_t = 0.0_wp   !! [N/m^gamma_t], [N s/m]

@@ -27,8 +27,7 @@ contains
     case ('constants'); allocate (law, source=law_constants(input))
     case default; error stop 'choose_law: no such law'
     end select
-    law%friction = input%friction
-    law%wall_friction = input%wall_friction
+    law%friction = [input%friction, input%wall_friction, input%bed_friction]
   end subroutine choose_law
 
   !> Depth at which contact points of a block harden: a quarter of its mean thickness, twice the

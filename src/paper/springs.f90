@@ -272,6 +272,7 @@ contains
       call update_motion(blocks, acting, counterparts)
       loads%force = 0.0_wp
       loads%torque = 0.0_wp
+      loads%force(3, 1:) = blocks%sling
       call sum_groups(dt_b, contacts%points, contacts%response, counterparts, displacements, &
         loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &

@@ -13,7 +13,7 @@ module case_check_m
   use shapes_builtin_m, only: make_shape, given_size
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
-  use case_blocks_m, only: height_at_level
+  use case_blocks_m, only: height_at_level, attitude_on
   use rest_depth_m, only: n_free
   use start_bodies_m, only: with_begun
   use given_motion_m, only: pose_at, fastest_between
@@ -303,6 +303,8 @@ contains
         place = place_of_block(drop, k)
         scene%blocks%shape(b) = shape_of_place(place, scene%blocks%shapes)
         if (scene%blocks%shape(b) == 0) cycle
+        place%q = attitude_on(scene%walls%bed, drop%handling, place, &
+          scene%blocks%shapes(scene%blocks%shape(b)))
         scene%blocks%q(:, b) = place%q
         scene%blocks%release_time(b) = place%time
         scene%origin(:, b) = [i, k]

@@ -56,7 +56,7 @@ contains
 
     wet = has_flow(case%run)
     with_blocks = case%run%physics /= 'fluid'
-    call blocks_init(case, shapes, blocks)
+    call blocks_init(case, shapes, blocks, bed)
     d_s = huge(d_s)
     do s = 1, size(shapes)
       if (case%contact%model == 'surface') then

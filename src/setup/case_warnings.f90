@@ -1,13 +1,15 @@
 !> What is allowed in a case but is hardly what its author meant: warnings of `--check`.
 module case_warnings_m
-  use kinds_m, only: wp, i8
+  use kinds_m, only: wp, i8, pi
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use case_blocks_m, only: turning_share
-  use bed_m, only: bed_t
+  use bed_m, only: bed_t, facet_within, max_clip_corners
+  use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
   use vectors_m, only: rotation_matrix
+  use bed_measure_m, only: area_vector
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
@@ -44,6 +46,7 @@ contains
     if (case%fluid%gravity(3) > 0.0_wp) call warnings%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
     if (case%run%physics /= 'dry') call look_at_water(case, warnings)
+    if (bed%there .and. size(shapes) > 0) call look_at_slope(case, shapes, bed, warnings)
     if (has_flow(case%run)) call look_at_sides(case, warnings)
     planned = planned_memory(case, shapes, bed)
     available = available_memory()
@@ -59,6 +62,42 @@ contains
       if (extreme_of_family(shapes, s)) call look_at_shape(case, case%shape(s), shapes(s), warnings)
     end do
   end subroutine find_case_warnings
+
+  !> Where the bed, seen over the length of a block, is steeper than its friction holds.
+  subroutine look_at_slope(case, shapes, bed, warnings)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
+    type(problems_t), intent(inout) :: warnings
+    integer, parameter :: most = 1000            !! squares along a side
+    real(wp), allocatable :: up(:, :, :)         ! (3, x, y) area of the facets of a square [m2]
+    real(wp) :: p(3, max_clip_corners), area(3), middle(2), size_of(2), share
+    integer :: n(2), at(2), f, m
+
+    associate (low => case%grid%origin, length => case%grid%length, mu => case%contact%bed_friction)
+      n = max(1, min(most, ceiling(0.5_wp*length(:2)/minval(shapes%radius))))
+      size_of = length(:2)/real(n, wp)
+      allocate (up(3, n(1), n(2)), source=0.0_wp)
+      do f = 1, size(bed%triangle, 2)
+        call facet_within(bed, f, low, low + length, m, p)
+        area = area_vector(p(:, :m))
+        if (.not. area(3) > 0.0_wp) cycle
+        at = min(n, 1 + int((sum(p(:2, :m), 2)/m - low(:2))/size_of))
+        up(:, at(1), at(2)) = up(:, at(1), at(2)) + area
+      end do
+      associate (slope => hypot(up(1, :, :), up(2, :, :))/max(up(3, :, :), tiny(1.0_wp)))
+        share = sum(up(3, :, :), slope > mu)/sum(up(3, :, :))
+        if (.not. share > 0.0_wp) return
+        at = maxloc(slope)
+        middle = low(:2) + (at - 0.5_wp)*size_of
+        call warnings%add_message('&bed file = '//quoted_text(case%bed%file)//': '// &
+          brief(100.0_wp*share, 2)//' % of it is steeper than the '//brief(atan(mu)*180.0_wp/pi, 3) &
+          //' degrees that friction = '//to_text(mu)//' holds, near x, y = '//brief(middle(1), 3) &
+          //', '//brief(middle(2), 3)//' m '//brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3) &
+          //' degrees: blocks slide there', case%bed%line)
+      end associate
+    end associate
+  end subroutine look_at_slope
 
   !> A level outside the tank, or no water at all.
   subroutine look_at_water(case, warnings)

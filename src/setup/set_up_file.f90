@@ -43,7 +43,7 @@ contains
 
     call grid_init(case%grid, case%boundary, state%grid)
     call clock_init(case%run, state%clock)
-    call blocks_init(case, shapes, state%blocks)
+    call blocks_init(case, shapes, state%blocks, bed)
     file%text = case%text
     file%parameters = parameters
     file%row = make_row(case%fluid, 0.0_wp, state, report)

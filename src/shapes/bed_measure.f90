@@ -1,11 +1,12 @@
-!> How much of the tank below a height is bed.
+!> How much of the tank below a height is bed, and how steep the bed is.
 module bed_measure_m
   use kinds_m, only: wp
+  use vectors_m, only: cross, norm
   use polygon_m, only: clip_polygon
   use bed_m, only: bed_t, facet_within, max_clip_corners
   implicit none
   private
-  public :: bed_volume
+  public :: bed_volume, area_vector, bed_normal
 
 contains
 
@@ -54,5 +55,38 @@ contains
         *((p(3, 1) + p(3, v) + p(3, v + 1))/3.0_wp - floor)
     end do
   end function column
+
+  !> Area of a flat polygon, along its normal [m2].
+  pure function area_vector(p) result(area)
+    real(wp), intent(in) :: p(:, :)   !! (3, n) corners; less than three have none [m]
+    real(wp) :: area(3)
+    integer :: v
+
+    area = 0.0_wp
+    do v = 2, size(p, 2) - 1
+      area = area + 0.5_wp*cross(p(:, v) - p(:, 1), p(:, v + 1) - p(:, 1))
+    end do
+  end function area_vector
+
+  !> Mean normal of the bed in a square around a place, of what looks up; up where there is none.
+  pure function bed_normal(bed, place, half) result(normal)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: place(2), half   !! middle, half of a side [m]
+    real(wp) :: normal(3)
+    real(wp) :: p(3, max_clip_corners), area(3)
+    integer :: f, n
+
+    normal = 0.0_wp
+    do f = 1, size(bed%triangle, 2)
+      associate (corner => bed%point(:2, bed%triangle(:, f)))
+        if (any(minval(corner, 2) > place + half .or. maxval(corner, 2) < place - half)) cycle
+      end associate
+      call facet_within(bed, f, place - half, place + half, n, p)
+      area = area_vector(p(:, :n))
+      if (area(3) > 0.0_wp) normal = normal + area
+    end do
+    if (.not. normal(3) > 0.0_wp) normal = [0.0_wp, 0.0_wp, 1.0_wp]
+    normal = normal/norm(normal)
+  end function bed_normal
 
 end module bed_measure_m

@@ -230,6 +230,7 @@ def _handled(drop: dict[str, Any], n: int, fixed: int) -> list[str]:
     if drop["lowering_speed"]:
         until = {
             "touch": "where it touches what lies below",
+            "set_down": "set down, when its sling is slack",
             "height": f"{drop.get('release_height', 0):.4g} m over what lies below",
         }.get(str(drop["release"]).strip(), "at its place, from the water level or the top of "
               "the tank")  # fmt: skip
