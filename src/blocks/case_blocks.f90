@@ -110,8 +110,8 @@ contains
     end associate
   end subroutine put_block
 
-  !> Attitude of a block at its place: as given, or turned from that so that what is level lies on the
-  !! slope of the bed below it.
+  !> Attitude of a block at its place: as given, or turned from that so that what is level lies on
+  !! the slope of the bed below it.
   pure function attitude_on(bed, handling, place, shape) result(q)
     type(bed_t), intent(in) :: bed
     type(handling_t), intent(in) :: handling

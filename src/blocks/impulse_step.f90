@@ -36,7 +36,7 @@ module impulse_step_m
   type, extends(contact_solver_t) :: impulses_t
     type(contact_surface_t) :: surface
     type(rows_t) :: rows
-    real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films of liquid [N]
+    real(wp), allocatable :: film(:, :)      !! (3, counterparts) forces of films and slings [N]
     real(wp), allocatable :: spread(:, :)    !! (3, counterparts) see `sum_loads` [N]
     real(wp), allocatable :: gain(:)         !! (n) work: speed gained in free fall [m/s]
     real(wp) :: restitution = 0.0_wp         !! [-]

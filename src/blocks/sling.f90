@@ -16,7 +16,7 @@ module sling_m
 
   real(wp), parameter :: gives_way = 0.01_wp     !! e [-]
   real(wp), parameter :: beyond = 0.1_wp         !! way of the end on below the block, over d [-]
-  real(wp), parameter :: slack_share = 0.05_wp   !! of the weight: a sling that carries less is slack
+  real(wp), parameter :: slack_share = 0.05_wp   !! of the weight: one that carries less is slack
 
 contains
 
@@ -49,7 +49,8 @@ contains
     type(blocks_t), intent(inout) :: blocks
     real(wp) :: k, c, rate, stretch
 
-    associate (m => blocks%mass(b) + blocks%added_mass(b), down => blocks%handling(b)%lowering_speed)
+    associate (m => blocks%mass(b) + blocks%added_mass(b), &
+      down => blocks%handling(b)%lowering_speed)
       k = max(weight, 0.0_wp)/(gives_way*blocks%shapes(blocks%shape(b))%smallest_edge)
       c = 2*sqrt(k*m)
       stretch = blocks%goal(b) - blocks%x(3, b)

@@ -367,11 +367,13 @@ contains
         not_negative('m/s', zero='0 means let go at once'), &
         'the block is held and lowered at this speed until its release', example='0.1')
       lowered = handling%lowering_speed > 0.0_wp .or. .not. v%good('lowering_speed')
-      call v%option('release', handling%release, 'place height touch set_down', 'where a lowered block is ' &
-        //'let go: at its place, to which it comes from the water level (without one the top of ' &
-        //'the tank); or, lowered from its place, at release_height over what lies below, or ' &
+      call v%option('release', handling%release, 'place height touch set_down', &
+        'where a lowered block is let go: at its place, to which it comes from the water level ' &
+        //'(without one the top of the tank); or, lowered from its place, at release_height over ' &
+        //'what lies below, or ' &
         //'where it touches that; or set down there: its sling holds it upright until it carries ' &
-        //'less than 5 % of the weight under water', example='lowering_speed = 0.1  release = ''touch''')
+        //'less than 5 % of the weight under water', &
+        example='lowering_speed = 0.1  release = ''touch''')
       call v%require('release', lowered .or. handling%release == 'place', &
         'needs lowering_speed above 0')
       call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
@@ -383,7 +385,7 @@ contains
         'how far above what lies below a lowered block is let go', &
         example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
       call v%option('attitude', handling%attitude, 'given bed', 'as given, or turned from that ' &
-        //'so that what is level lies on the slope of the bed below (''bed'', where there is one)', &
+        //'so that what is level lies on the slope of the bed below (''bed'', with a &bed)', &
         example='''given''')
     end subroutine visit_handling
   end subroutine visit_drop

@@ -35,8 +35,8 @@ module contact_response_m
 
 contains
 
-  !> The law of a case; the depth at which contact points of each counterpart harden, and the overlap
-  !! that each may have at rest, a share of its smallest edge.
+  !> The law of a case; the depth at which contact points of each counterpart harden, and the
+  !! overlap that each may have at rest, a share of its smallest edge.
   subroutine response_init(input, blocks, response)
     type(contact_input_t), intent(in) :: input
     type(blocks_t), intent(in) :: blocks

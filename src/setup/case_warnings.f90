@@ -91,8 +91,9 @@ contains
         at = maxloc(slope)
         middle = low(:2) + (at - 0.5_wp)*size_of
         call warnings%add_message('&bed file = '//quoted_text(case%bed%file)//': '// &
-          brief(100.0_wp*share, 2)//' % of it is steeper than the '//brief(atan(mu)*180.0_wp/pi, 3) &
-          //' degrees that friction = '//to_text(mu)//' holds, near x, y = '//brief(middle(1), 3) &
+          brief(100.0_wp*share, 2)//' % of it is steeper than the ' &
+          //brief(atan(mu)*180.0_wp/pi, 3)//' degrees that friction = '//to_text(mu) &
+          //' holds, near x, y = '//brief(middle(1), 3) &
           //', '//brief(middle(2), 3)//' m '//brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3) &
           //' degrees: blocks slide there', case%bed%line)
       end associate

@@ -83,8 +83,8 @@ contains
     call check('one contact step each', steps, 200)
   end subroutine check_whole_steps
 
-  !> The largest force of an impact is its impulse over the contact time, whatever the step: m (1 + e)
-  !! v/t_c, with the weight; then the weight alone.
+  !> The largest force of an impact is its impulse over the contact time, whatever the step:
+  !! m (1 + e) v/t_c, with the weight; then the weight alone.
   subroutine check_peak()
     real(wp), parameter :: step(3) = [4.0e-4_wp, 2.0e-3_wp, 7.0e-3_wp], e = 0.3_wp
     real(wp), parameter :: fall = 0.011_wp, v = sqrt(1.0_wp + 2*g*fall)   !! [m], [m/s]
@@ -96,7 +96,8 @@ contains
         [0.5_wp, 0.5_wp, 0.5_wp*d + fall], [0.0_wp, 0.0_wp, -1.0_wp]), world)
       call move(world, ceiling(0.02_wp/step(i)), step(i))
       associate (peak => world%blocks%record%peak, m => world%blocks%mass(1))
-        call check('impact, steps of '//to_text(step(i)), peak(1)/m, (1.0_wp + e)*v/dt + 0.5_wp*g, 8.0_wp)
+        call check('impact, steps of '//to_text(step(i)), peak(1)/m, &
+          (1.0_wp + e)*v/dt + 0.5_wp*g, 8.0_wp)
         call move(world, ceiling(0.5_wp/step(i)), step(i))
         peak = 0.0_wp
         call move(world, 1, step(i))

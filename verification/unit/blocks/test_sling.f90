@@ -1,0 +1,50 @@
+!> A block in the sling of a crane: how it goes down, what the sling carries, when it lets go.
+module test_sling_m
+  use kinds_m, only: wp
+  use check_m, only: check
+  use errors_m, only: to_text
+  use rigid_body_m, only: release_body, let_go
+  use sling_m, only: hang, hangs, let_off
+  use world_m, only: world_t, set_up, move
+  implicit none
+  private
+  public :: test_sling
+
+contains
+
+  !> It goes down at the speed of lowering with the weight in the sling, at any step; on the floor
+  !! the sling becomes slack and lets go of a block at rest that has not turned.
+  subroutine test_sling()
+    real(wp), parameter :: g = 9.81_wp, down = 0.1_wp, dt(3) = [1.0e-4_wp, 2.0e-3_wp, 0.05_wp]
+    type(world_t) :: world
+    real(wp) :: weight
+    integer :: i, k
+
+    do i = 1, 3
+      call set_up('&run t_end=1 physics="dry"/ &grid cells=3*2 length=3*1/ &shape name="cube" ' &
+        //'kind="cube" size=.1/ &drop shape="cube" position=.5,.5,.2 lowering_speed=.1 ' &
+        //'release="set_down" axis=1,1,0 angle_deg=10/', world)
+      associate (blocks => world%blocks)
+        weight = blocks%mass(1)*g
+        call release_body(0.0_wp, 1, blocks)
+        call check('moved down at first', blocks%fixed(1) .and. .not. hangs(1, blocks))
+        call hang(1, blocks)
+        call move(world, nint(0.5_wp/dt(i)), dt(i))
+        call check('speed, steps of '//to_text(dt(i)), blocks%v(3, 1), -down, 1.0e-3_wp)
+        call check('the sling carries it', blocks%sling(1), weight, 0.01_wp*weight)
+        call check('told as contact', blocks%contact_force(3, 1), weight, 0.01_wp*weight)
+        call let_off(weight, 0.5_wp, 1, blocks)
+        call check('not slack', hangs(1, blocks))
+        do k = 1, nint(1.5_wp/dt(i))
+          call move(world, 1, dt(i))
+          call let_off(weight, 2.0_wp, 1, blocks)
+          if (.not. hangs(1, blocks)) exit
+        end do
+        call check('let go', blocks%status(1), let_go)
+        call check('at rest', norm2(blocks%v(:, 1)) < 0.02_wp)
+        call check('on its edge', blocks%q(1, 1), cos(5.0_wp*acos(-1.0_wp)/180.0_wp), 1.0e-9_wp)
+      end associate
+    end do
+  end subroutine test_sling
+
+end module test_sling_m
