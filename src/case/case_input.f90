@@ -200,18 +200,18 @@ contains
     type(group_text_t), intent(inout) :: list(:)
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
-    integer :: d, i
+    integer :: d, i, n
 
     call check_names()
     call check_streams()
     if (case%run%physics == 'light') call check_given_water()
     call find_idle()
-    d = 0
+    n = 0
     do i = 1, size(list)
       if (list(i)%name /= 'drop') cycle
-      d = d + 1
+      n = n + 1
       call v%start(list(i))
-      call v%require('attitude', case%drop(d)%handling%attitude == 'given' &
+      call v%require('attitude', case%drop(n)%handling%attitude == 'given' &
         .or. len_trim(case%bed%file) > 0, 'needs a &bed')
     end do
     i = first_of(list, 'grid')

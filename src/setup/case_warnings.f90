@@ -9,7 +9,7 @@ module case_warnings_m
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
   use vectors_m, only: rotation_matrix
-  use bed_measure_m, only: area_vector
+  use polygon_m, only: area_vector
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text

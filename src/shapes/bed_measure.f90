@@ -1,12 +1,12 @@
 !> How much of the tank below a height is bed, and how steep the bed is.
 module bed_measure_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, norm
-  use polygon_m, only: clip_polygon
+  use vectors_m, only: norm
+  use polygon_m, only: clip_polygon, area_vector
   use bed_m, only: bed_t, facet_within, max_clip_corners
   implicit none
   private
-  public :: bed_volume, area_vector, bed_normal
+  public :: bed_volume, bed_normal
 
 contains
 
@@ -55,18 +55,6 @@ contains
         *((p(3, 1) + p(3, v) + p(3, v + 1))/3.0_wp - floor)
     end do
   end function column
-
-  !> Area of a flat polygon, along its normal [m2].
-  pure function area_vector(p) result(area)
-    real(wp), intent(in) :: p(:, :)   !! (3, n) corners; less than three have none [m]
-    real(wp) :: area(3)
-    integer :: v
-
-    area = 0.0_wp
-    do v = 2, size(p, 2) - 1
-      area = area + 0.5_wp*cross(p(:, v) - p(:, 1), p(:, v + 1) - p(:, 1))
-    end do
-  end function area_vector
 
   !> Mean normal of the bed in a square around a place, of what looks up; up where there is none.
   pure function bed_normal(bed, place, half) result(normal)
