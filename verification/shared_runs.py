@@ -3,8 +3,10 @@
 import fcntl
 import os
 import subprocess
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -35,6 +37,11 @@ def shared_run(tmp_path_factory: pytest.TempPathFactory) -> SharedRun:
         return folder
 
     return results
+
+
+def texts(name: str) -> dict[str, Any]:
+    """The cases of a test file, and rows of its tests, which stand in a table of their own."""
+    return tomllib.loads((Path(__file__).parent / "texts" / f"{name}.toml").read_text())
 
 
 def call(*words: object, **settings) -> subprocess.CompletedProcess[str]:

@@ -8,35 +8,16 @@ import signal
 import subprocess
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
+from micstools.reading.reader import Run
 from run_cases import CASES
-from shared_runs import after_restart
+from shared_runs import after_restart, texts
 from shared_runs import told as mics
 
-WET = """&run t_end = {t_end}  dt = 0.01  restart_interval = 0.01  field_interval = 0.01 /
-&grid cells = 8, 8, 8  length = 1, 1, 1 /
-&fluid water_level = 0.5 /
-"""
-BLOCK = """mics-shape 1
-points 4
-0 0 0  {size} 0 0  0 {size} 0  0 0 {size}
-tets 1
-1 2 3 4
-"""
-
-
-def numbers(path: Path) -> dict[str, np.ndarray]:
-    """Some of what the rows hold, and how the run ended."""
-    with h5py.File(path / "run.h5") as h5:
-        return {
-            "exit_status": np.ravel(h5["provenance"].attrs["exit_status"]),
-            "time": h5["series/time"][:],
-            "transport_parts": h5["series/transport_parts"][:],
-            "quaternion": h5["bodies/quaternion"][:],
-        }
+TEXTS = texts("going_on")
+WET = TEXTS["wet"]
 
 
 @pytest.mark.parametrize("coupling", ["monolithic", "mics"])
@@ -50,11 +31,7 @@ def test_outflow_with_the_predictor_of_the_paper(coupling: str, tmp_path: Path) 
 def test_fast_small_blocks(tmp_path: Path) -> None:
     """Where blocks are as fast as contact follows, which of them are near limits the substep."""
     chance = random.Random(2)
-    first = chance.choice([0.05, 0.06, 0.07, 0.08])
-    case = f"""&run physics = 'dry'  t_end = 0.16  dt = 0.004  restart_interval = {first} /
-    &grid cells = 8, 8, 8  length = 0.1, 0.1, 0.4 /
-    &shape name = 'a'  kind = 'cube'  size = 0.005 /
-    """
+    case = TEXTS["fast"].format(first=chance.choice([0.05, 0.06, 0.07, 0.08]))
     places: list[list[float]] = []
     while len(places) < 40:
         place = [chance.uniform(*ends) for ends in ((0.01, 0.09), (0.01, 0.09), (0.05, 0.35))]
@@ -68,14 +45,10 @@ def test_fast_small_blocks(tmp_path: Path) -> None:
 
 
 def test_another_shape_file_is_refused(tmp_path: Path) -> None:
-    case = """&run physics = 'dry'  t_end = 0.04  dt = 0.01  restart_interval = 0.02 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &shape name = 'a'  kind = 'file'  file = 'block.txt' /
-    &body shape = 'a'  position = 0.5, 0.5, 0.5 /
-    """
-    (tmp_path / "block.txt").write_text(BLOCK.format(size=0.1))
+    case = TEXTS["of_a_file"]
+    (tmp_path / "block.txt").write_text(TEXTS["block"].format(size=0.1))
     assert mics(tmp_path, case) == (0, "")
-    (tmp_path / "block.txt").write_text(BLOCK.format(size=0.2))
+    (tmp_path / "block.txt").write_text(TEXTS["block"].format(size=0.2))
     code, said = mics(tmp_path, case, "--restart", "mics-out/restart-a.h5")
     assert code == 2, said
     assert "checksum of the shape a" in said
@@ -126,34 +99,25 @@ def test_rows_of_every_step_wanted_later(tmp_path: Path) -> None:
     assert mics(tmp_path, case) == (0, "")
     case = case.replace("history_interval = 0.04", "history_interval = 0")
     assert mics(tmp_path, case, "--restart", "mics-out/restart-a.h5") == (0, "")
-    found = numbers(tmp_path / "mics-out")
-    assert found["time"] == pytest.approx([0.0, 0.04])
-    assert (found["transport_parts"][1:] > 0).all()
+    found = Run(tmp_path / "mics-out").series
+    assert found.time == pytest.approx([0.0, 0.04])
+    assert (found.transport_parts[1:] > 0).all()
 
 
 def test_attitude_after_a_stop_between_rows(tmp_path: Path) -> None:
     """q and -q are one attitude; which of them is written follows the rows that are due."""
-    case = """&run physics = 'dry'  t_end = {t_end}  dt = 0.01  history_interval = 1 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &shape name = 'a'  kind = 'cube'  size = 0.1 /
-    &body shape = 'a'  position = 0.5, 0.5, 0.5  angular_velocity = 0, 0, 4  fixed = .true. /
-    """
-    whole = case.format(t_end=3)
+    whole, part = (TEXTS["turning"].format(t_end=t_end) for t_end in (3, 0.6))
     assert mics(tmp_path, whole, "--output", "whole") == (0, "")
-    assert mics(tmp_path, case.format(t_end=0.6), "--output", "parts") == (0, "")
+    assert mics(tmp_path, part, "--output", "parts") == (0, "")
     assert mics(tmp_path, whole, "--restart", "parts/restart-a.h5") == (0, "")
-    one, two = (numbers(tmp_path / name)["quaternion"] for name in ("whole", "parts"))
+    one, two = (Run(tmp_path / name).bodies.quaternion for name in ("whole", "parts"))
     assert one.shape == two.shape == (4, 1, 4)
     assert np.abs(one - two).max() < 1e-6
 
 
 def test_no_room_for_the_last_frame(tmp_path: Path) -> None:
     """A limit stands for a full disk: the results say that the run did not end well."""
-    case = """&run physics = 'dry'  t_end = 0.01  dt = 0.01  field_interval = 0.03 /
-    &grid cells = 8, 8, 8  length = 10, 10, 10 /
-    &shape name = 'a'  kind = 'hexapod'  size = 0.1  refinement = 3 /
-    """
-    case += "".join(
+    case = TEXTS["many"] + "".join(
         f"&body shape = 'a'  position = {x}, {y}, 5 /\n" for x in range(1, 9) for y in range(1, 9)
     )
     assert mics(tmp_path, case, "--output", "free") == (0, "")
@@ -170,7 +134,7 @@ def test_no_room_for_the_last_frame(tmp_path: Path) -> None:
         folder = f"full{percent}"
         code, said = mics(tmp_path, case, "--output", folder, preexec_fn=no_room)
         assert (code == 4) == ("blocks.vtkhdf" in said)
-        assert numbers(tmp_path / folder)["exit_status"] == code
+        assert Run(tmp_path / folder).provenance["exit_status"] == code
         codes.add(code)
     assert codes == {0, 4}
 
@@ -183,16 +147,8 @@ def test_nothing_left_to_stop(tmp_path: Path) -> None:
 
 def test_only_up_is_open_to_fall_back_from(tmp_path: Path) -> None:
     """With gravity a little aslant a block that leaves by a side is out."""
-    case = """&run physics = 'dry'  t_end = 1  dt = 0.01 /
-    &grid cells = 8, 8, 8  length = 1, 1, 1 /
-    &boundary x_min = 'inflow'  x_min_velocity = 0.1, 0, 0  x_max = 'outflow' /
-    &fluid gravity = -0.5, 0, -9.8  water_level = 0.5 /
-    &shape name = 'a'  kind = 'cube'  size = 0.1 /
-    &body shape = 'a'  position = 0.5, 0.5, 0.8  velocity = 1.5, 0, 0 /
-    """
-    code, said = mics(tmp_path, case)
-    assert code == 0
-    assert "body 1 is out" in said
+    code, said = mics(tmp_path, TEXTS["aslant"])
+    assert code == 0 and "body 1 is out" in said
 
 
 @pytest.mark.parametrize("harm", ["cut", "changed", "gone"])

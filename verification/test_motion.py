@@ -12,24 +12,9 @@ import shared_runs
 from measures.budget import Budget
 from micstools.reading.reader import Run
 
-TANK = "&grid cells = 16, 8, 12  length = 0.16, 0.08, 0.12 /\n"
-DRY = "&run t_end = {end}  dt = 0.01  physics = 'dry'  field_interval = 0 /\n" + TANK
-WET = (
-    "&run t_end = {end}  dt = 0.005  field_interval = 0  restart_interval = 0.02 /\n"
-    + TANK
-    + "&fluid water_level = 0.08 /\n"
-)
-PLATE = "&shape name = 'plate'  kind = 'box'  size = 0.01, 0.06, 0.06 /\n"
-MOVED = "&body shape = 'plate'  fixed = T  motion = 'way.csv' {more} /\n"
-CUBE = (
-    "&shape name = 'cube'  kind = 'cube'  size = 0.02 /\n"
-    "&body shape = 'cube'  position = 0.06, 0.04, 0.01 /\n"
-)
-STEADY = "time,x,y,z\n-1,-0.05,0.04,0.04\n0,0.04,0.04,0.04\n1,0.13,0.04,0.04\n2,0.22,0.04,0.04\n"
-DOOR = (
-    "time, x, y, z, qw, qx, qy, qz\n0, 0.05, 0.04, 0.05, 1, 0, 0, 0\n"
-    "0.05, 0.07, 0.04, 0.055, 0.96, 0, 0.28, 0\n0.1, 0.08, 0.04, 0.05, 0.8, 0, 0.6, 0\n"
-)
+TEXTS = shared_runs.texts("motion")
+DRY, WET, PLATE, MOVED, CUBE = (TEXTS[name] for name in ("dry", "wet", "plate", "moved", "cube"))
+STEADY, DOOR = TEXTS["steady"], TEXTS["door"]
 
 
 def mics(work: Path, case: str, table: str, *options: str) -> subprocess.CompletedProcess[str]:
@@ -41,9 +26,9 @@ def mics(work: Path, case: str, table: str, *options: str) -> subprocess.Complet
 
 def run(work: Path, case: str, table: str) -> h5py.File:
     """The results of a good run."""
-    work.mkdir(exist_ok=True)
-    (work / "way.csv").write_text(table)
-    return shared_runs.results(work, case)
+    done = mics(work, case, table)
+    assert done.returncode == 0, done.stderr
+    return h5py.File(work / "mics-out" / "run.h5")
 
 
 def test_a_plate_pushes_a_cube(tmp_path: Path) -> None:
@@ -64,12 +49,8 @@ def test_a_plate_pushes_a_cube(tmp_path: Path) -> None:
 def test_sleepers_wake_for_it(tmp_path: Path) -> None:
     """A cube asleep on a held plate is carried when that begins to rise after two seconds."""
     table = "time,x,y,z\n2,0.06,0.04,0.03\n2.5,0.06,0.04,0.05\n"
-    case = (
-        DRY.format(end=3.0)
-        + "&shape name = 'plate'  kind = 'box'  size = 0.06, 0.06, 0.01 /\n"
-        + MOVED.format(more="")
-        + CUBE.replace("0.04, 0.01 /", "0.04, 0.0451 /")
-    )
+    case = DRY.format(end=3.0) + PLATE.replace("0.01, 0.06, 0.06", "0.06, 0.06, 0.01")
+    case += MOVED.format(more="") + CUBE.replace("0.04, 0.01 /", "0.04, 0.0451 /")
     with run(tmp_path, case, table) as h5:
         time, x = h5["bodies/time"][:], h5["bodies/position"][:, 1, 2]
         before = h5["series/sleeping"][:][np.searchsorted(time, 1.99)]
@@ -80,11 +61,8 @@ def test_sleepers_wake_for_it(tmp_path: Path) -> None:
 def test_steady_rows_are_a_given_velocity(tmp_path: Path) -> None:
     """Between rows of a steady motion the flow is that of a body with `velocity`."""
     case = WET.format(end=0.1) + PLATE
-    given = (
-        "&body shape = 'plate'  fixed = T  position = 0.04, 0.04, 0.04  velocity = 0.09, 0, 0 /\n"
-    )
     with run(tmp_path / "a", case + MOVED.format(more=""), STEADY) as a, \
-            run(tmp_path / "b", case + given, STEADY) as b:  # fmt: skip
+            run(tmp_path / "b", case + TEXTS["given"], STEADY) as b:  # fmt: skip
         for name in ("bodies/position", "bodies/velocity", "bodies/fluid_force"):
             scale = np.abs(b[name][:]).max()
             assert np.abs(a[name][:] - b[name][:]).max() < 1e-7 * scale, name
@@ -115,14 +93,7 @@ def test_momentum_of_what_moves(
     poses: list[Callable[[float], tuple[float, float, float]]], tmp_path: Path
 ) -> None:
     """The force on bodies that accelerate by a table is what the fluid gains and the walls bear."""
-    case = (
-        "&run t_end = 0.2  dt = 0.01  field_interval = 1e-5 /\n"
-        "&grid cells = 25, 8, 30  length = 0.5, 0.16, 0.6 /\n"
-        "&boundary x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip'"
-        "  z_min = 'slip' /\n"
-        "&fluid water_level = 0.55 /\n"
-        "&shape name = 'plate'  kind = 'box'  size = 0.19, 0.12, 0.013 /\n"
-    )
+    case = TEXTS["large"]
     for b, pose in enumerate(poses):
         (tmp_path / f"{b}.csv").write_text(way(pose))
         case += f"&body shape = 'plate'  fixed = T  motion = '{b}.csv' /\n"
@@ -167,14 +138,7 @@ def test_restart_changes_no_bit(physics: str, tmp_path: Path) -> None:
     assert done.returncode == 2 and "motion" in done.stderr, done.stderr
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("velocity = 1, 0, 0", "&body velocity = 1, 0, 0: has no meaning with motion"),
-        ("position = 0.06, 0.04, 0.05", "has the body at 0.05, 0.04, 0.05 then"),
-        ("quaternion = 1, 0, 0, 0", "has an attitude, and so has the &body"),
-    ],
-)
+@pytest.mark.parametrize(("more", "message"), TEXTS["taken_over"])
 def test_what_a_table_takes_over(more: str, message: str, tmp_path: Path) -> None:
     done = mics(tmp_path, DRY.format(end=1) + PLATE + MOVED.format(more=more), DOOR)
     assert done.returncode == 2 and message in done.stderr, done.stderr
@@ -191,33 +155,13 @@ def test_the_same_place_and_free_bodies(tmp_path: Path) -> None:
     assert "there is no such file" in none.stderr and none.returncode == 2
 
 
-AWAY = "time,x,y,z\n0,0.03,0.04,0.04\n1,0.13,0.04,0.04\n"
-BOX = "&body shape = 'cube'  fixed = T  {} /\n"
-
-
-@pytest.mark.parametrize(
-    ("other", "told"),
-    [
-        (
-            BOX.format("position = 0.1, 0.04, 0.05"),
-            "at 0.535 s it reaches 0.000305 m into the &body on line 6",
-        ),
-        (BOX.format("position = 0.1, 0.04, 0.05  release_time = 0.7"), "at 0.701 s it reaches 0.0"),
-        (BOX.format("motion = 'across.csv'"), "into the &body on line 4"),
-        (
-            "&bed file = 'bed.txt' /\n",
-            "at 0.535 s it reaches more than 1 % of its size into the bed",
-        ),
-        (BOX.format("position = 0.1, 0.04, 0.09") + "&fluid water_level = 0.1 /\n", ""),
-        (BOX.format("position = 0.1, 0.04, 0.05  release_time = 1.1"), ""),
-        (BOX.replace("fixed = T", "").format("position = 0.1, 0.04, 0.02"), ""),
-    ],
-)
+@pytest.mark.parametrize(("other", "told"), TEXTS["in_the_way"])
 def test_what_stands_in_the_way(other: str, told: str, tmp_path: Path) -> None:
     """Fixed bodies, moved ones and the bed are met before the run; free blocks are pushed."""
     (tmp_path / "across.csv").write_text("time,x,y,z\n0,0.1,0.015,0.05\n1,0.1,0.065,0.05\n")
     (tmp_path / "bed.txt").write_text("3 2 0 0 .08 .08\n0 0 .08 0 0 .08\n")
     case = DRY.format(end=1) + PLATE + MOVED.format(more="") + CUBE.splitlines()[0] + "\n" + other
-    done = mics(tmp_path, case, AWAY, "--check")
+    away = "time,x,y,z\n0,0.03,0.04,0.04\n1,0.13,0.04,0.04\n"
+    done = mics(tmp_path, case, away, "--check")
     assert (done.returncode, told in done.stderr) == (2 if told else 0, True), done.stderr
     assert len(done.stderr.splitlines()) == (1 if told else 0) or "across" in done.stderr
