@@ -11,17 +11,15 @@ import pytest
 from micstools.cases.initial_state import write_initial_state
 from micstools.reading.reader import Run
 from run_cases import CASES, ROOT, Machine, prepare
-from shared_runs import call
+from shared_runs import call, texts
 
 INPUT = sorted((ROOT / "input").glob("*.nml"))
 GOOD = [*INPUT, *sorted(CASES.glob("*/*.nml"))]
 
 SERIAL = Machine(ROOT / "mics")
 
-TANK = """&run t_end = 1 /
-&grid cells = 15, 10, 10  length = 0.3, 0.2, 0.2 /
-&shape name = 'cube'  kind = 'cube'  size = 0.02 /
-"""
+TEXTS = texts("input")
+TANK, FILES = TEXTS["tank"], TEXTS["files"]
 BODY = "&body shape = 'cube'  position = "
 
 UNKNOWN = "&run tend = 2: unknown variable, nearest known: t_end (line 1)"
@@ -78,15 +76,6 @@ def test_plan_tells_the_numbers(tmp_path: Path) -> None:
     assert submerged == pytest.approx((2300 - 998.2) * 9.81 * volume, rel=1e-3)
 
 
-FILES = """&run t_end = 1e-6  dt = 1e-6 /
-&grid cells = 3, 2, 2  length = 0.3, 0.2, 0.2 /
-&bed file = 'flat.txt' /
-&shape name = 'a'  kind = 'file'  file = 'block.txt' /
-&body shape = 'a'  position = 0.15, 0.1, 0.15  fixed = .true. /
-&fluid initial_state = 'state.h5' /
-"""
-
-
 def write_named_files(folder: Path, height: float, size: float, liquid: float) -> None:
     """What FILES names."""
     folder.mkdir(exist_ok=True)
@@ -102,30 +91,19 @@ def from_lines(plan: str) -> list[str]:
     return [line for line in lines if line.startswith(("bed from", "a from", "initial state"))]
 
 
-BESIDE = [
-    "bed from flat.txt, 2 facets, heights from 0.01 to 0.01 m",
-    "initial state from state.h5",
-    "a from block.txt, 0.05 x 0.05 x 0.05 m, 4 facets",
-]
-HERE = [
-    "bed from flat.txt, 2 facets, heights from 0.02 to 0.02 m",
-    "initial state from state.h5",
-    "a from block.txt, 0.06 x 0.06 x 0.06 m, 4 facets",
-]
-
-
 def test_files_are_looked_for_beside_the_case_first(tmp_path: Path) -> None:
     """Then in the working folder, which the plan says; standard input has no folder."""
     write_named_files(tmp_path / "sub", 0.01, 0.05, 1.0)
     write_named_files(tmp_path, 0.02, 0.06, 0.0)
     case = tmp_path / "sub" / "case.nml"
     case.write_text(FILES)
+    beside, here = TEXTS["beside"], TEXTS["here"]
     for words, folder, text, wanted in (
-        ([str(case)], tmp_path, "", BESIDE),
-        (["sub/case.nml"], tmp_path, "", BESIDE),
-        (["case.nml"], tmp_path / "sub", "", BESIDE),
-        ([], tmp_path, FILES, HERE),
-        (["/dev/stdin"], tmp_path, FILES, HERE),
+        ([str(case)], tmp_path, "", beside),
+        (["sub/case.nml"], tmp_path, "", beside),
+        (["case.nml"], tmp_path / "sub", "", beside),
+        ([], tmp_path, FILES, here),
+        (["/dev/stdin"], tmp_path, FILES, here),
     ):
         done = mics(["--check", *words], folder, text)
         assert (done.returncode, done.stderr) == (0, "")
@@ -139,7 +117,7 @@ def test_files_are_looked_for_beside_the_case_first(tmp_path: Path) -> None:
     done = mics(["--check", "sub/case.nml"], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     there = " in the working folder, not beside the case"
-    wanted = [re.sub(r"(from \S+?)(,|$)", rf"\1{there}\2", line) for line in HERE]
+    wanted = [re.sub(r"(from \S+?)(,|$)", rf"\1{there}\2", line) for line in here]
     assert from_lines(done.stdout) == wanted
 
 
@@ -179,18 +157,14 @@ def bodies_apart(count: int) -> str:
 
 LARGE = {
     "bodies": (bodies_apart, 20000, "free                    {count}"),
-    "long title": (
-        lambda count: TANK.replace("= 1 /", f"= 1  title = '{'a' * count}' /"),
-        1000000,
-        "Memory",
-    ),
+    "long title": (lambda n: TANK.replace("= 1 /", f"= 1  title = '{n * 'a'}' /"), 10**6, "Memory"),
     "groups": (
-        lambda count: TANK + "&fluid /\n" * count,
+        lambda n: TANK + n * "&fluid /\n",
         100000,
         "&fluid: the group is given twice, first on line 4",
     ),
     "variables": (
-        lambda count: TANK + "&fluid " + "".join(f"v{i} = 1\n" for i in range(count)) + "/",
+        lambda n: TANK + "&fluid " + "".join(f"v{i} = 1\n" for i in range(n)) + "/",
         100000,
         "&fluid: more than 1000 variables in one group (line 1004)",
     ),
@@ -234,26 +208,17 @@ def test_line_ends_and_byte_order_mark(ending: str, tmp_path: Path) -> None:
 
 @pytest.mark.xdist_group("ranks")
 def test_every_rank_stops_and_one_speaks(tmp_path: Path) -> None:
-    """The parallel build prints each message once and ends with the same code."""
-    machine = Machine(ROOT / "mics_mpi", ranks=2)
-    case = tmp_path / "case.nml"
+    """The parallel build prints each message once and ends with the same code; mpirun gives
+    standard input to one process, which hands it on, or speaks for all."""
+    machine, case = Machine(ROOT / "mics_mpi", ranks=2), tmp_path / "case.nml"
     case.write_text(MISSPELT)
-    done = mics([str(case)], tmp_path, machine=machine)
-    assert done.returncode == 2
-    assert done.stderr.count(UNKNOWN) == 1
-    assert list(tmp_path.iterdir()) == [case]
-
-
-@pytest.mark.xdist_group("ranks")
-def test_ranks_read_standard_input(tmp_path: Path) -> None:
-    """mpirun gives it to one process, which hands it on, or speaks for all."""
-    machine = Machine(ROOT / "mics_mpi", ranks=2)
-    done = mics(["--check"], tmp_path, TANK, machine=machine)
+    for words, text in ([str(case)], ""), ([], MISSPELT):
+        done = mics(words, tmp_path, text, machine)
+        assert done.returncode == 2
+        assert done.stderr.count(UNKNOWN) == 1
+    done = mics(["--check"], tmp_path, TANK, machine)
     assert (done.returncode, done.stderr) == (0, "")
-    done = mics([], tmp_path, MISSPELT, machine=machine)
-    assert done.returncode == 2
-    assert done.stderr.count(UNKNOWN) == 1
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [case]
 
 
 @pytest.mark.parametrize("words", [["--check"], ["--version"], ["--help"]])
