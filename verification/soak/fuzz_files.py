@@ -16,6 +16,7 @@ import resource
 import struct
 import subprocess
 import tempfile
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -25,7 +26,6 @@ import h5py
 import numpy as np
 import trimesh
 
-from micstools.shapes.meshing import shape_text
 from run_cases import ROOT
 from run_soak import Given
 
@@ -36,12 +36,7 @@ TAKEN, REFUSED, NUMERICS, FILES, STOPPED = 0, 2, 3, 4, 143  # exit codes of the 
 FEW_STEPS = ("--quiet", "--max-wall", "0:00:02")  # a damaged case may have become a long one
 OWN = ("mics: ", "  ")  # how lines of the program begin, such that follow on
 
-NASTY = [
-    *("0", "-1", "1", "2", "3", "7", "100000000", "2147483647", "2147483648", "-2147483648"),
-    *("99999999999999999999", "1000000000", "1e8", "-1e8", "1e19", "1e21", "1e308", "1e999"),
-    *("1e-320", "nan", "inf", "-inf", "1.5", "1e", "0x10", "1,5", "''", "#", "$Nodes", "tets"),
-    *("points", "vertex", "endfacet", "\0", "\xff\xfe", "1.7976931348623157e308"),
-]
+TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
 
 
 @dataclass(frozen=True)
@@ -59,55 +54,13 @@ class Kind:
 
     def case(self) -> str:
         """A small case in a tank of 1 m with the file."""
-        return (
-            "&run t_end = 0.002 dt = 0.001 field_interval = 0 " + self.more + " /\n"
-            "&grid cells = 6, 4, 5  length = 1, 1, 1 /\n"
-            "&shape name = 'cube'  kind = 'cube'  size = 0.26 /\n"
-            "&body shape = 'cube'  position = 0.2, 0.2, 0.85 /\n" + self.group + "\n"
-        )
+        return str(TEXTS["reading"].format(more=self.more, group=self.group))
 
 
-def tets_of_grid(n: int) -> tuple[list[tuple[float, float, float]], list[list[int]]]:
-    """Points and tetrahedra (from 1) of a bar of n unit cubes, each cut into six."""
-    points = [(float(i), float(j), float(k)) for i in range(n + 1) for j in (0, 1) for k in (0, 1)]
-    paths = [(4, 2, 1), (4, 1, 2), (2, 4, 1), (2, 1, 4), (1, 4, 2), (1, 2, 4)]
-    tets = []
-    for i in range(n):
-        for path in paths:
-            corner = [4 * i + 1]
-            for step in path:
-                corner.append(corner[-1] + step)
-            tets.append(corner)
-    return points, tets
-
-
-def own_form(rng: random.Random) -> bytes:
-    """The program's own shape file."""
-    points, tets = tets_of_grid(rng.randint(1, 4))
-    return shape_text(np.array(points), np.array(tets) - 1).encode()
-
-
-def gmsh(rng: random.Random) -> bytes:
-    """A Gmsh file of version 2.2 or 4.1."""
-    points, tets = tets_of_grid(rng.randint(1, 4))
-    place = [" ".join(map(repr, p)) for p in points]
-    corners = [" ".join(map(str, t)) for t in tets]
-    if rng.random() < 0.5:
-        rows = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(points))]
-        rows += [f"{i} {p}" for i, p in enumerate(place, 1)]
-        rows += ["$EndNodes", "$Elements", str(len(tets) + 1), "1 2 2 0 1 1 2 3"]
-        rows += [f"{i} 4 2 0 1 {c}" for i, c in enumerate(corners, 2)]
-    else:
-        half, n = len(points) // 2, len(points)
-        rows = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$Entities", "0 0 0 1"]
-        rows += ["1 0 0 0 1 1 1 0 0", "$EndEntities", "$Nodes", f"2 {n} 1 {n}"]
-        for begin, end in ((0, half), (half, n)):
-            rows += [f"3 {begin + 1} 0 {end - begin}", *map(str, range(begin + 1, end + 1))]
-            rows += place[begin:end]
-        rows += ["$EndNodes", "$Elements", f"2 {len(tets) + 1} 1 {len(tets) + 1}", "2 1 2 1"]
-        rows += ["1 1 2 3", f"3 1 4 {len(tets)}"]
-        rows += [f"{i} {c}" for i, c in enumerate(corners, 2)]
-    return ("\n".join([*rows, "$EndElements"]) + "\n").encode()
+def bar(form: str) -> Callable[[random.Random], bytes]:
+    """A bar of one or four cubes, each cut into six tetrahedra, in a form of mesh files."""
+    files = sorted((Path(__file__).parent / "good").glob(f"*.{form}"))
+    return lambda rng: rng.choice(files).read_bytes()
 
 
 def heightmap(rng: random.Random) -> bytes:
@@ -148,85 +101,53 @@ def initial_state(rng: random.Random, odd: bool = False) -> bytes:
 
 
 def odd_state(h5: h5py.File, rng: random.Random) -> None:
-    """Replace the liquid by something that is not what should stand there."""
+    """Replace the liquid by something that is not what should stand there, or by nothing."""
     del h5["liquid"]
     shape = (5, 4, 6)
-    match rng.randrange(14):
+    values = [
+        np.full(shape, rng.choice([np.nan, np.inf, -1.0, 2.0, 1e308])),
+        np.ones(rng.choice([(5, 4), (5, 4, 6, 1), (6, 4, 5), (0, 4, 6), ()])),
+        np.full(shape, b"text", dtype=h5py.string_dtype(length=8)),
+        np.full(shape, "text", dtype=h5py.string_dtype()),
+        np.ones(shape, rng.choice(["i1", "u8", ">f4", "f2", ">f8", "i8"])),
+        np.zeros(shape, [("a", "f8"), ("b", "i4")]),
+        np.ones(shape, dtype=complex),
+        h5py.SoftLink("/liquid"),
+        h5py.ExternalLink("missing.h5", "/liquid"),
+        h5py.Empty("f8"),
+    ]
+    match rng.randrange(len(values) + 4):
         case 0:
-            h5["liquid"] = np.full(shape, rng.choice([np.nan, np.inf, -1.0, 2.0, 1e308]))
-        case 1:
-            h5["liquid"] = np.ones(rng.choice([(5, 4), (5, 4, 6, 1), (6, 4, 5), (0, 4, 6), ()]))
-        case 2:
             h5.create_dataset("liquid", (10**6, 10**6, 10**6), "f8", chunks=(1, 1, 1000))
-        case 3:
+        case 1:
             h5.create_group("liquid")
-        case 4:
-            h5["liquid"] = np.full(shape, b"text", dtype=h5py.string_dtype(length=8))
-        case 5:
-            h5["liquid"] = np.full(shape, "text", dtype=h5py.string_dtype())
-        case 6:
-            h5["liquid"] = np.ones(shape, rng.choice(["i1", "u8", ">f4", "f2", ">f8", "i8"]))
-        case 7:
-            h5["liquid"] = np.zeros(shape, [("a", "f8"), ("b", "i4")])
-        case 8:
-            h5["liquid"] = h5py.SoftLink("/liquid")
-        case 9:
-            h5["liquid"] = h5py.ExternalLink("missing.h5", "/liquid")
-        case 10:
-            h5["liquid"] = h5py.Empty("f8")
-        case 11:
+        case 2:
             h5.create_dataset("liquid", shape, "f8")  # nothing written
-        case 12:
-            h5["liquid"] = np.ones(shape, dtype=complex)
-        case 13:
+        case 3:
             pass
-
-
-SIDES = ("no_slip", "slip", "open", "inflow", "outflow", "periodic")
-BODIES = """&shape name = 'unit'  kind = '{kind}'  size = {size}  refinement = 1 /
-&body shape = 'unit'  position = 0.5, 0.5, 0.25  fixed = .true. /
-&body shape = 'unit'  position = 0.3, 0.4, 0.7  axis = 1, 2, 3  angle_deg = 20  velocity = 0, 0, 1 /
-&drop shape = 'unit'  position = 0.6, 0.5, 0.6  count = 2  interval = 0.001  spread = 0.1, 0.1, 0
-  orientation = 'random'  seed = 3 /
-"""
-SIZES = {"cylinder": "0.1, 0.2", "box": "0.1, 0.2, 0.15", "hexapod": "0.05", "sphere": "0.15"}
+        case way:
+            h5["liquid"] = values[way - 4]
 
 
 def small_case(rng: random.Random) -> bytes:
     """A case of any physics with some of all groups."""
-    physics = rng.choice(("coupled", "coupled", "fluid", "dry"))
-    side = rng.choice(SIDES)
-    rows = [
-        f"&run title = 'a case'  physics = '{physics}'  t_end = 0.004  dt = 0.002  cfl_max = 0.5",
-        "  output = 'out'  field_interval = 0.002  restart_interval = 0.002 /",
-        "&grid cells = 16, 12, 14  length = 1, 1, 1  origin = 0, 0, 0 /",
-        f"&boundary x_min = '{side}'  x_max = '{side if side == 'periodic' else 'slip'}'",
-        f"  z_max = 'open'{'  x_min_velocity = 0.1, 0, 0' if side == 'inflow' else ''} /",
-        "&fluid liquid_density = 998.2  gas_viscosity = 1.82e-5  gravity = 0, 0, -9.81",
-        f"  water_level = 0.4  surface_tension = {rng.choice(('0.0', '0.072'))} /",
-        "&water min = 0.1, 0.1, 0.3  max = 0.4, 0.6, 0.55 /",
-        f"&numerics momentum = '{rng.choice(('conservative', 'c_ismac'))}'",
-        f"  solid_fraction = '{rng.choice(('exact', 'subcell'))}'  max_pressure_passes = 20 /",
-        f"&contact model = '{rng.choice(('surface', 'spheres'))}'",
-        f"  law = '{rng.choice(('restitution', 'constants'))}'  friction = 0.5 /",
-    ]
-    kind = rng.choice(("cylinder", "box", "hexapod", "sphere"))
-    if physics != "fluid":
-        rows.append(BODIES.format(kind=kind, size=SIZES[kind]))
-    return "\n".join(rows).encode() + b"\n"
+    drawn = {name: rng.choice(words) for name, words in TEXTS["choices"].items()}
+    text = str(TEXTS["case"].format(**drawn))
+    return (text.split("&shape")[0] if drawn["physics"] == "fluid" else text).encode()
 
 
 SHAPE = "&shape name = 'file'  kind = 'file'  file = 'file'  scale = 0.1  {} /\n"
 PLACE = "&body shape = 'file'  position = 0.5, 0.5, 0.7 /"
 BED = "&bed file = 'file'  kind = '{}' /"
+DRY = "physics = 'dry'"
 KINDS = {
     kind.name: kind
     for kind in (
         Kind("case", small_case, count=10000),
-        Kind("msh", gmsh, SHAPE.format("") + PLACE, more="physics = 'dry'"),
-        Kind("shape", own_form, SHAPE.format("spheres = 'dense'") + PLACE, more="physics = 'dry'"),
-        Kind("heightmap", heightmap, BED.format("heightmap"), more="physics = 'dry'"),
-        Kind("stl", stl, BED.format("stl"), "<f", more="physics = 'dry'"),
+        Kind("msh", bar("msh"), SHAPE.format("") + PLACE, more=DRY),
+        Kind("shape", bar("shape"), SHAPE.format("spheres = 'dense'") + PLACE, more=DRY),
+        Kind("heightmap", heightmap, BED.format("heightmap"), more=DRY),
+        Kind("stl", stl, BED.format("stl"), "<f", more=DRY),
         Kind(
             "initial_state",
             initial_state,
@@ -273,7 +194,7 @@ def damaged_text(data: bytes, rng: random.Random) -> bytes:
             if not words:
                 return data
             word = rng.choice(numbers if numbers and rng.random() < 0.9 else words)
-            new = rng.choice(NASTY).encode("latin-1")
+            new = rng.choice(TEXTS["nasty"]).encode("latin-1")
             if rng.random() < 0.2:
                 new = rng.choice(words)[0]
             if rng.random() < 0.2 and re.fullmatch(rb"\d+", word[0]):
