@@ -1,8 +1,10 @@
 """Measured ground becomes a map of heights; what is missing or stands askew is refused."""
 
 import re
+import tomllib
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,17 +18,8 @@ from micstools.shapes import height_maps
 # From y_min to y_max, x in each row.
 Z = 10.0 * np.arange(3)[:, None] + np.arange(4)
 POINTS = [(101.0 + 2 * k, 201.0 + 2 * j, z) for (j, k), z in np.ndenumerate(Z)]
-ESRI = """\
-ncols 4
-nrows 3
-xllcorner 100.0
-yllcorner 200.0
-cellsize 2.0
-NODATA_value -99
-20 21 22 23
-10 11 12 13
-0 1 2 3
-"""
+TABLES = tomllib.loads(Path(__file__).with_name("height_maps.toml").read_text())
+ESRI: str = TABLES["esri"]
 
 
 def same(found: height_maps.HeightMap, z: np.ndarray = Z) -> None:
@@ -88,18 +81,7 @@ def test_scattered_points_are_refused_or_drawn(tmp_path: Path) -> None:
     assert inside == pytest.approx(3 + 2 * gx - gy, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("points", "said"),
-    [
-        ([(0, 0, 1), (1, 0, 2), (2, 0, 1.5), (3.3, 0, 1)], "stand on one line"),
-        ([(0, 0, 1), (1, 1, 2), (2.5, 2.5, 1.5)], "stand on one line"),
-        ([(5e6 + 1.1 * k, 4e5 + 2.2 * k, k) for k in range(9)], "stand on one line"),
-        ([(0, 0, 1), (1, 1, 2)], "stand on one line"),
-        ([(0, 0, 1), (0, 0, 1)], "stand on one line"),
-        ([(0, 0, 1), (1, 0, 1), (2, 0, 1), (0, 1, -9999), (1, 1, -9999)], "stand on one line"),
-        ([(0, 0, -9999), (1, 0, -9999), (0, 1, -9999)], "holds no height"),
-    ],
-)
+@pytest.mark.parametrize(("points", "said"), TABLES["no_area"])
 def test_points_on_one_line_cannot_be_drawn(tmp_path: Path, points: list, said: str) -> None:
     """A section through a flume, as some solvers write their bed: it is needed twice."""
     path = save(tmp_path / "a.xyz", "\n".join(f"{x!r} {y!r} {z!r}" for x, y, z in points))
@@ -194,34 +176,24 @@ def test_a_geotiff_without_its_place_is_refused(
         height_maps.load(geotiff(tmp_path / "a.tif", Z.astype(np.float32), keys, tags=tags))
 
 
-FEET = 0.3048
-US_FEET = 1200 / 3937
+def in_system(path: Path, epsg: int, x: float = 100, y: float = 206, **more: Any) -> Any:
+    """A GeoTIFF of 4 x 3 heights in a system, its upper left corner at x and y, to write into."""
+    return rasterio.open(
+        path, "w", driver="GTiff", width=4, height=3, count=1, crs=rasterio.CRS.from_epsg(epsg),
+        transform=rasterio.transform.from_origin(x, y, 2, 2), **{"dtype": "float32"} | more,
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("epsg", "told", "unit", "along", "up"),
-    [
-        (32631, "", None, 1.0, 1.0),
-        (32631, "ft", None, 1.0, FEET),
-        (32631, "", "cm", 1.0, 0.01),
-        (2263, "US survey foot", None, US_FEET, US_FEET),
-        (2263, "metre", None, US_FEET, 1.0),
-        (2263, "", "us-ft", US_FEET, US_FEET),
-    ],
-)
+@pytest.mark.parametrize(("epsg", "told", "unit", "along", "up"), TABLES["geotiff"])
 def test_a_geotiff_in_its_own_units(
-    tmp_path: Path, epsg: int, told: str, unit: str | None, along: float, up: float
+    tmp_path: Path, epsg: int, told: str, unit: str, along: float, up: float
 ) -> None:
     """Places in the unit of the system, heights in that of the band, packed as 2 z - 30."""
     path = tmp_path / "a.tif"
-    packed = (2 * (Z[::-1] + 30)).astype(np.int16)
-    with rasterio.open(
-        path, "w", driver="GTiff", width=4, height=3, count=1, dtype="int16", nodata=64,
-        crs=rasterio.CRS.from_epsg(epsg), transform=rasterio.transform.from_origin(100, 206, 2, 2),
-    ) as raster:  # fmt: skip
-        raster.write(packed, 1)
+    with in_system(path, epsg, dtype="int16", nodata=64) as raster:
+        raster.write((2 * (Z[::-1] + 30)).astype(np.int16), 1)
         raster.scales, raster.offsets, raster.units = (0.5,), (-30.0,), (told,)
-    found = height_maps.load(path, unit=unit)
+    found = height_maps.load(path, unit=unit or None)
     assert found.first == pytest.approx((101 * along, 201 * along))
     assert found.spacing == pytest.approx((2 * along, 2 * along))
     assert found.z == pytest.approx(up * np.where(Z == 2, np.nan, Z), nan_ok=True)
@@ -229,7 +201,7 @@ def test_a_geotiff_in_its_own_units(
     assert any("times 0.5 plus -30" in r for r in found.remarks)
 
 
-@pytest.mark.parametrize(("code", "factor"), [(9001, 1.0), (9002, FEET), (9003, US_FEET)])
+@pytest.mark.parametrize(("code", "factor"), [(9001, 1.0), (9002, 0.3048), (9003, 1200 / 3937)])
 def test_a_geotiff_with_bare_keys_of_units(tmp_path: Path, code: int, factor: float) -> None:
     """Of places (3076) and of heights (4099), in a system without a name."""
     keys = (1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3076, 0, 1, code, 4099, 0, 1, code)
@@ -241,10 +213,7 @@ def test_a_geotiff_with_bare_keys_of_units(tmp_path: Path, code: int, factor: fl
 
 def test_heights_of_unknown_unit_are_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "a.tif"
-    with rasterio.open(
-        path, "w", driver="GTiff", width=4, height=3, count=1, dtype="float32",
-        crs=rasterio.CRS.from_epsg(2263), transform=rasterio.transform.from_origin(100, 206, 2, 2),
-    ) as raster:  # fmt: skip
+    with in_system(path, 2263) as raster:
         raster.write(Z.astype(np.float32), 1)
     with pytest.raises(BadRun, match="lies in US survey foot .* give --unit"):
         height_maps.load(path)
@@ -252,36 +221,19 @@ def test_heights_of_unknown_unit_are_asked_about(tmp_path: Path) -> None:
         height_maps.load(path, unit="yard")
 
 
-@pytest.mark.parametrize(
-    ("head", "unit", "along", "up"),
-    [
-        ("x [ft], y [ft], z [m]", None, FEET, 1.0),
-        ("x (cm);y (cm);z (cm)", None, 0.01, 0.01),
-        ("x_ft y_ft z_us-ft", None, FEET, US_FEET),
-        ("x y z", "mm", 0.001, 0.001),
-        ("Easting [m], Northing [m], Elevation [ft]", "cm", 1.0, FEET),
-    ],
-)
+@pytest.mark.parametrize(("head", "unit", "along", "up"), TABLES["units"])
 def test_points_in_units_of_their_names(
-    tmp_path: Path, head: str, unit: str | None, along: float, up: float
+    tmp_path: Path, head: str, unit: str, along: float, up: float
 ) -> None:
     text = head + "\n" + "\n".join(" ".join(map(str, row)) for row in POINTS)
-    found = height_maps.load(save(tmp_path / "a.xyz", text), unit=unit)
+    found = height_maps.load(save(tmp_path / "a.xyz", text), unit=unit or None)
     assert found.spacing == pytest.approx((2 * along, 2 * along)) and found.remarks
     assert found.z == pytest.approx(up * Z)
     with pytest.raises(BadRun, match="unit 'fathom' is none of"):
         height_maps.load(save(tmp_path / "b.xyz", "x [m] y [m] z [fathom]\n0 0 1\n"))
 
 
-@pytest.mark.parametrize(
-    "table",
-    [
-        "z,y,x\n{z},0,0\n{z},0,1\n{z},1,0\n-5,1,1",
-        "ID;North (cm);East (cm);Depth (cm)\na;0;0;100\nb;0;100;100\nc;100;0;100\nd;100;100;500",
-        "Elevation North East time\n{z} 0 0 9:00\n{z} 0 1 9:01\n{z} 1 0 9:02\n-5 1 1 9:03",
-        "e\tn\tWater depth\n0\t0\t-1\n1\t0\t-1\n0\t1\t-1\n1\t1\t-5",
-    ],
-)
+@pytest.mark.parametrize("table", TABLES["named"])
 def test_columns_mean_what_their_names_say(table: str, tmp_path: Path) -> None:
     found = height_maps.load(save(tmp_path / "a.csv", table.format(z=-1)))
     assert found.z.tolist() == [[-1.0, -1.0], [-1.0, -5.0]]
@@ -319,11 +271,7 @@ def test_lost_points_and_unknown_systems_are_told(tmp_path: Path, capsys) -> Non
     told = capsys.readouterr()
     assert "note      remarks look like points, 2 in all, the first on line 2" in told.out
     assert "coordinates of a survey, whose system the file does not tell" in told.err
-    with rasterio.open(
-        tmp_path / "a.tif", "w", driver="GTiff", width=4, height=3, count=1, dtype="float32",
-        crs=rasterio.CRS.from_epsg(25832),
-        transform=rasterio.transform.from_origin(354200, 5621080, 2, 2),
-    ) as raster:  # fmt: skip
+    with in_system(tmp_path / "a.tif", 25832, 354200, 5621080) as raster:
         raster.write(Z.astype(np.float32), 1)
     assert mics_tools(["bed", str(tmp_path / "a.tif"), "--out", str(tmp_path / "bed.txt")]) == 0
     told = capsys.readouterr()
@@ -340,27 +288,12 @@ def test_a_picture_is_no_map(tmp_path: Path) -> None:
         height_maps.load(tmp_path / "b.tif")
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "said"),
-    [
-        ("a.png", "", "must end in one of .asc, .xyz"),
-        ("a.asc", "", "no whole header"),
-        ("a.asc", ESRI.replace("cellsize 2.0\n", ""), "no whole header"),
-        ("a.asc", ESRI.replace("cellsize 2.0", "cellsize -2.0"), "no whole header"),
-        ("a.asc", ESRI.replace("23\n", "\n"), "holds 11 heights, 4 x 3 were announced"),
-        ("a.asc", ESRI.replace("12 13", "12,5 13"), "'12,5' stands where a number should"),
-        ("a.asc", re.sub(r"\b\d+ \d+ \d+ \d+\b", "-99 -99 -99 -99", ESRI), "holds no height"),
-        ("a.xyz", "", "must hold x, y and z"),
-        ("a.xyz", "1 2\n", "must hold x, y and z"),
-        ("a.xyz", "1O 0 1\n0 1 1\n1 1 1\n", "'1O' stands where a number should"),
-        ("a.xyz", "0 0 1\n1 0 1\n0 1 1\n1 1 1\n1 1 2\n", "two points stand in the same place"),
-        ("a.asc", ESRI.replace("12", "-99"), "1 of 12 points have no height, the first at 105, 20"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "text", "said"), TABLES["no_map"])
 def test_what_is_no_map_is_one_line(
-    tmp_path: Path, name: str, text: str, said: str, capsys
+    tmp_path: Path, name: str, text: str | list[str], said: str, capsys
 ) -> None:
-    words = [str(save(tmp_path / name, text)), "--out", str(tmp_path / "bed.txt")]
+    whole = text if isinstance(text, str) else re.sub(text[0], text[1], ESRI)
+    words = [str(save(tmp_path / name, whole)), "--out", str(tmp_path / "bed.txt")]
     assert mics_tools(["bed", *words]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
@@ -371,21 +304,12 @@ def test_what_is_no_map_is_one_line(
 def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
     """A model at 1:50 of a part of the map, its gap filled, under a tank of 60 x 40 mm."""
     path = save(tmp_path / "a.asc", ESRI.replace("12", "-99"))
-    words = ["--fill", "12.5", "--window", "101.5,201.5,104.5,203.5", "--origin", "101.5,201.5,0"]
-    assert (
-        mics_tools(
-            ["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words, "--scale", "0.02"]
-        )
-        == 0
-    )
+    words = ["bed", str(path), "--out", str(tmp_path / "bed.txt"), "--fill", "12.5", "--window",
+             "101.5,201.5,104.5,203.5", "--origin", "101.5,201.5,0", "--scale", "0.02"]  # fmt: skip
+    assert mics_tools(words) == 0
     assert "filled    1 points with 12.5 m" in capsys.readouterr().out
-    lines = (tmp_path / "bed.txt").read_text().splitlines()
-    assert lines[1:] == [
-        "3 3 -0.01 -0.01 0.04 0.04",
-        "0 0.02 0.04",
-        "0.2 0.22 0.25",
-        "0.4 0.42 0.44",
-    ]
+    written = (tmp_path / "bed.txt").read_text().split("\n", 1)[1]
+    assert written == "3 3 -0.01 -0.01 0.04 0.04\n0 0.02 0.04\n0.2 0.22 0.25\n0.4 0.42 0.44\n"
     case = (
         "&run t_end = 1 /\n&grid cells = 6, 4, 40  length = 0.06, 0.04, 0.4 /\n"
         "&bed file = 'bed.txt' /\n"
