@@ -85,13 +85,12 @@ def test_every_look_has_place_time_and_advice(make_run: Callable[[Motion], Run])
     assert kicks.largest(run).good is False  # type: ignore[union-attr]
 
 
-def test_rows_of_several_steps_do_not_tell_the_energy_of_contact(make_run) -> None:
-    check = checks_of(make_run(APART))["largest energy that contact made in a step"]
+def test_what_is_not_known(make_run) -> None:
+    """By rows of several steps, and by what older programs did not write."""
+    run = make_run(APART)
+    check = checks_of(run)["largest energy that contact made in a step"]
     assert check.good is None and check.found.startswith("not known: needs a row every step")
-
-
-def test_what_older_programs_do_not_tell(make_run) -> None:
-    found = checks_of(changed(make_run(APART), volume_excess_max=np.nan, energy_excess=np.nan))
+    found = checks_of(changed(run, volume_excess_max=np.nan, energy_excess=np.nan))
     assert not any("excess of fluid" in name for name in found)
     assert any("not known" in c.found for name, c in found.items() if "put in" in name)
 
@@ -310,29 +309,23 @@ def test_windows_are_whole() -> None:
     assert found[whole] == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("what", ["touched", "above", "held", "not released", "no level", "dry"])
-def test_blocks_that_do_not_count(what: str) -> None:
-    """The kicked block touches another one, or is not under water, free or in water at all."""
-    run = falling(kick=1.5 * PULL * SPAN)
-    kicked = run.bodies.time >= 0.5 - 1e-9
-    if what == "touched":
-        run.bodies.contacts[kicked, 1] = 1
-    elif what == "above":
-        run.bodies.position[:, 1, 2] = LEVEL - 0.34 * LENGTH
-    elif what == "held":
-        run.bodies.dropped = np.array([0])
-    elif what == "not released":
-        run.bodies.release_time[1] = 0.5
-    elif what == "no level":
-        run = falling(kick=5.0, values={("fluid", "water_level"): None})
-    else:
-        run = falling(kick=5.0, values={("run", "physics"): "dry"})
-    found = kicks.largest(run)
-    if what in {"no level", "dry"}:
-        assert found is None
-        assert np.isnan(kicks.acceleration(run)).all()
-    else:
+def test_blocks_that_do_not_count() -> None:
+    """The kicked block touches another one, or is not under water, held or not let go."""
+    touched, above, held, later = (falling(kick=1.5 * PULL * SPAN) for _ in range(4))
+    touched.bodies.contacts[touched.bodies.time >= 0.5 - 1e-9, 1] = 1
+    above.bodies.position[:, 1, 2] = LEVEL - 0.34 * LENGTH
+    held.bodies.dropped = np.array([0])
+    later.bodies.release_time[1] = 0.5
+    for run in (touched, above, held, later):
+        found = kicks.largest(run)
         assert found and found.acceleration == pytest.approx(0.2)
+
+
+def test_no_water_kicks() -> None:
+    for name, value in (("fluid", "water_level"), None), (("run", "physics"), "dry"):
+        run = falling(kick=5.0, values={name: value})
+        assert kicks.largest(run) is None
+        assert np.isnan(kicks.acceleration(run)).all()
 
 
 def test_a_landing_is_no_kick() -> None:
@@ -359,29 +352,30 @@ def test_rows_too_far_apart_do_not_tell() -> None:
     assert kicks.largest(falling(step=0.02, dt=0.02)).good  # type: ignore[union-attr]
 
 
+SINKING = Motion(t_end=0.9, field_step=0.9, history_step=0.005, level=0.19)
+
+
 def test_findings_tell_it(make_run) -> None:
     """In rows of every step a drop that a smooth motion carries is not kicked, and a jump is."""
-    run = make_run(Motion(t_end=0.9, field_step=0.9, history_step=0.005, level=0.19))
-    run.__dict__["series"] = SimpleNamespace(dt=np.full(run.bodies.time.size, 0.005))
+    run = changed(make_run(SINKING), dt=0.005)
     assert _untouched(run).seen
     assert "block 4 at t = " in _untouched(run).figures
     here = (run.bodies.contacts[:, 3] == 0) & (run.bodies.time > 0.2)
     run.bodies.velocity[here, 3, 1] += 0.3
     assert _untouched(run).seen is False
-    run.__dict__["series"] = SimpleNamespace(dt=np.full(run.bodies.time.size, 1e-3))
-    assert _untouched(run).seen is None
+    assert _untouched(changed(run, dt=1e-3)).seen is None
     assert pile.report([_untouched(run)]).startswith("?    untouched blocks")
 
 
 def test_pages_and_history_tell_it(make_run) -> None:
-    run = make_run(Motion(t_end=0.9, field_step=0.9, history_step=0.005, level=0.19))
+    run = make_run(SINKING)
     title = "acceleration of untouched blocks under water [g], limit dashed"
     name = "largest acceleration of an untouched block"
     row = run_page.page(run).split(name)[1].split("</tr>")[0]
     assert "not known (needs rows every 0.002 s)" in row and ">–<" in row
     assert title not in [axis.get_title(loc="left") for axis in plots.history(run).axes]
-    run.__dict__["series"] = replace(run.series, dt=np.full(run.bodies.time.size, 0.005))
-    row = run_page.page(run).split(name)[1].split("</tr>")[0].replace("\u00a0", " ")
+    row = run_page.page(changed(run, dt=0.005)).split(name)[1].split("</tr>")[0]
+    row = row.replace("\u00a0", " ")
     assert "g, block 4 at t = " in row and "below 1 g over 0.017 s" in row and "good" in row
     assert title in [axis.get_title(loc="left") for axis in plots.history(run).axes]
 

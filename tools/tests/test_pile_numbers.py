@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -17,14 +18,20 @@ from micstools.shapes.geometry import quaternion_from_axis
 from synthetic import UPRIGHT, Motion, reword, with_bed
 
 EDGE = 0.02
+WHOLE, SHORT = Motion(history_step=0.05), Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8))
+
+
+def cubes(*places: tuple[float, float, float], motion: Motion = WHOLE) -> Motion:
+    """Cubes that come to lie in some places; the fixed blocks are cubes, too."""
+    ends = [(np.array(place), UPRIGHT) for place in places]
+    return replace(motion, shape=shapes.cube(EDGE), places=ends)
 
 
 def test_stacked_cubes(make_run) -> None:
-    """Two towers of cubes on the floor, three and one high; the fixed blocks are cubes, too."""
+    """Two towers of cubes on the floor, three and one high."""
     half = EDGE / 2
     towers = [(0.03, half), (0.03, 3 * half), (0.03, 5 * half), (0.27, half)]
-    places = [(np.array([x, 0.03, z]), UPRIGHT) for x, z in towers]
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    run = make_run(cubes(*((x, 0.03, z) for x, z in towers)))
     found = pile_numbers.numbers(run, step=0.001)
     assert found.blocks == 7
     assert found.on_floor == 2
@@ -44,8 +51,7 @@ def test_stacked_cubes(make_run) -> None:
 
 def test_a_door_is_no_part_of_the_pile(make_run) -> None:
     """One of the fixed cubes is moved by a table and hangs high: neither pile nor ground."""
-    places = [(np.array([0.2, 0.03, EDGE / 2]), UPRIGHT)]
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    run = make_run(cubes((0.2, 0.03, EDGE / 2)))
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/position"][:, 1] = (0.2, 0.03, 0.15)
     second = re.compile(r"(?s)^(.*?fixed.*?fixed = \.true\.)")
@@ -58,9 +64,7 @@ def test_a_door_is_no_part_of_the_pile(make_run) -> None:
 
 def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
     """A tower of two cubes on a bed 1 cm high, and a cube that hangs above it."""
-    places = [(np.array([0.03, 0.03, z]), UPRIGHT) for z in (0.02, 0.04)]
-    places.append((np.array([0.27, 0.03, 0.021]), UPRIGHT))
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    run = make_run(cubes((0.03, 0.03, 0.02), (0.03, 0.03, 0.04), (0.27, 0.03, 0.021)))
     assert pile_numbers.numbers(run, step=0.001).on_floor == 0
     run = with_bed(run.folder, lambda x, y: 0 * x + 0.01)
     assert pile_numbers.numbers(run, step=0.001).on_floor == 1
@@ -69,8 +73,7 @@ def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
 def test_layer_and_porosity_on_a_slope(make_run) -> None:
     """Cubes on a slope of 1:5 along x: the height of each over the bed, and a box less the bed in
     it."""
-    places = [(np.array([x, 0.03, 0.0101 + 0.2 * (x + 0.01)]), UPRIGHT) for x in (0.03, 0.25)]
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    run = make_run(cubes(*((x, 0.03, 0.0101 + 0.2 * (x + 0.01)) for x in (0.03, 0.25))))
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/position"][:, :3, 0] = 0.14  # the fixed ones, all at one place above the bed
         h5["bodies/position"][:, :3, 2] = 0.2 * 0.14 + 0.05
@@ -108,8 +111,7 @@ def test_height_map_of_a_cube_and_a_tilted_one() -> None:
 
 def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     """One cube beside the three fixed ones: four outlines, and its top in the map."""
-    place = (np.array([0.03, 0.03, 0.05]), UPRIGHT)
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=[place], history_step=0.05))
+    run = make_run(cubes((0.03, 0.03, 0.05)))
     assert mics_tools(["pile", str(run.folder)]) == 0
     content = json.loads((run.folder / "pile.json").read_text())
     assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
@@ -128,9 +130,7 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
 
 def test_the_command_prints_units_by_the_size_of_the_blocks(make_run, capsys) -> None:
     """A cube of 0.67 m: m, m2 and kN, and limits that are as large; plain ASCII."""
-    place = (np.array([0.03, 0.03, 0.05]), UPRIGHT)
-    run = make_run(Motion(shape=shapes.cube(EDGE), places=[place], history_step=0.05, t_end=2.0,
-                          field_step=2.0, cells=(12, 4, 8), scale=100 / 3))  # fmt: skip
+    run = make_run(cubes((0.03, 0.03, 0.05), motion=replace(SHORT, scale=100 / 3)))
     mics_tools(["pile", str(run.folder)])
     said = capsys.readouterr().out
     rows = dict(line.split(None, 1) for line in said.splitlines() if line.startswith("     "))
@@ -143,23 +143,17 @@ def test_the_command_prints_units_by_the_size_of_the_blocks(make_run, capsys) ->
     assert json.loads((run.folder / "pile.json").read_text())["units"]["contact_force"] == "N"
 
 
-PERIODIC = "&boundary x_min = 'periodic' x_max = 'periodic' /\n"
-
-
 def test_blocks_touch_and_cover_through_a_periodic_side(make_run, capsys) -> None:
     """Two cubes side by side, one at x_max, one a period on: the pile is that of a closed box moved
     along."""
-    ends = [(np.array([x, 0.05, 0.01]), UPRIGHT) for x in (0.295, 0.615)]
-    run = make_run(Motion(shape=shapes.cube(0.02), places=ends, t_end=3.0, cells=(12, 4, 8),
-                          field_step=3.0, more=PERIODIC))  # fmt: skip
+    periodic = replace(SHORT, more="&boundary x_min = 'periodic' x_max = 'periodic' /\n")
+    run = make_run(cubes((0.295, 0.05, 0.01), (0.615, 0.05, 0.01), motion=periodic))
     assert run.period.tolist() == pytest.approx([0.3, 0.0, 0.0])
     seen = find_contacts(run, -1)
     assert (3, 4) in seen.blocks and set(seen.blocks) == {(3, 4)}
     bodies = present_bodies(run, -1)
     assert [float(bodies[k].position[0]) for k in (3, 4)] == pytest.approx([0.295, 0.015])
-    alone = make_run(Motion(shape=shapes.cube(0.02), places=[], t_end=3.0, cells=(12, 4, 8),
-                            field_step=3.0))  # fmt: skip
-    bare = pile_numbers.numbers(alone, 0.001)
+    bare = pile_numbers.numbers(make_run(cubes(motion=SHORT)), 0.001)
     found = pile_numbers.numbers(run, 0.001)
     assert found.plan_area - bare.plan_area == pytest.approx(2 * 0.02**2, rel=0.06)
     assert 0.0 < found.porosity < 1.0
@@ -176,19 +170,17 @@ def test_contact_spheres_touch_where_they_are(make_run) -> None:
     gaps = [sphere_gap(standing, standing.moved(np.array([way, 0, 0]))) for way in ways]
     way = float(ways[np.flatnonzero(np.array(gaps) >= 0.0)[0]])  # spheres just touch
     assert way > 0.0206
-    ends = [(np.array([x, 0.05, -lowest]), UPRIGHT) for x in (0.04, 0.04 + way)]
+    both = cubes((0.04, 0.05, -lowest), (0.04 + way, 0.05, -lowest), motion=SHORT)
     spheres, surface = (
-        find_contacts(
-            make_run(Motion(shape=cube, places=ends, t_end=3.0, cells=(12, 4, 8),
-                            field_step=3.0, more=f"&contact model = '{model}' /\n")), -1)
+        find_contacts(make_run(replace(both, more=f"&contact model = '{model}' /\n")), -1)
         for model in ("spheres", "surface")
-    )  # fmt: skip
+    )
     assert spheres.on_floor(3) and spheres.on_floor(4) and (3, 4) in spheres.blocks
     assert not surface.on_floor(3) and (3, 4) not in surface.blocks
 
 
 def test_nothing_to_tell_before_the_first_block(make_run, capsys) -> None:
-    run = make_run(Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8)))
+    run = make_run(SHORT)
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/release_time"][:] = 5.0
     run.refresh()
@@ -200,17 +192,15 @@ def test_nothing_to_tell_before_the_first_block(make_run, capsys) -> None:
 
 
 def test_results_without_a_row_are_one_line(make_run, capsys) -> None:
-    run = make_run(Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8)))
+    run = make_run(SHORT)
     with h5py.File(run.folder / "run.h5", "r+") as h5:
+        rows = len(h5["bodies/time"])
         for group in ("bodies", "series"):
             for name, data in list(h5[group].items()):
-                if data.shape[:1] == h5["bodies/time"].shape:
+                if len(data) == rows:
                     values = data[:0]
-                    if name != "time" or group == "series":
-                        del h5[group][name]
-                        h5[group][name] = values
-        del h5["bodies/time"]
-        h5["bodies/time"] = np.empty(0)
+                    del h5[group][name]
+                    h5[group][name] = values
     run.refresh()
     assert "rows    0, none yet" in str(run)
     for command in ("pile", "report"):
