@@ -53,17 +53,11 @@ def write_ensemble(
     return folder
 
 
-def cube_run(places: list[tuple[float, float, float]], more: str = "") -> Motion:
+def cube_run(places: list[tuple[float, float, float]]) -> Motion:
     """Cubes dropped one a second that end at some places."""
-    return Motion(
-        shape=shapes.cube(EDGE),
-        places=[(np.array(place), UPRIGHT) for place in places],
-        t_end=len(places) + 1.0,
-        history_step=0.05,
-        field_step=len(places) + 1.0,
-        cells=(12, 4, 8),
-        more=more,
-    )
+    ends, t_end = [(np.array(place), UPRIGHT) for place in places], len(places) + 1.0
+    return Motion(shape=shapes.cube(EDGE), places=ends, t_end=t_end, history_step=0.05,
+                  field_step=t_end, cells=(12, 4, 8))  # fmt: skip
 
 
 def row(number: int, outcome: str) -> dict:
@@ -167,13 +161,6 @@ def test_where_blocks_lie(ensemble: pile_ensemble.Ensemble, tmp_path: Path, caps
     assert placing["area"]["high"] == [0.3, 0.1]
     assert mics_tools(["pile", str(ensemble.folder), "--area", "0.3", "0", "0.2", "0.1"]) == 2
     assert "first corner must be the lower" in capsys.readouterr().err
-
-
-def test_an_area_is_for_an_ensemble(ensemble: pile_ensemble.Ensemble, capsys) -> None:
-    run = str(ensemble.piles[0].run.folder)
-    for command in ("pile", "report"):
-        assert mics_tools([command, run, "--area", "0", "0", "1", "1"]) == 2
-        assert "for an ensemble" in capsys.readouterr().err
 
 
 def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:
@@ -305,27 +292,21 @@ def test_an_ensemble_without_a_complete_pile_tells_so(tmp_path: Path) -> None:
     assert text.count("data-pile=") == 2 and 'id="plan"' not in text
 
 
-def test_no_pattern_where_the_papers_blocks_are_not(tmp_path: Path) -> None:
-    folder = write_ensemble(tmp_path)
-    found = pile_ensemble.open_ensemble(folder, 0.002)
-    text = ensemble_page.page(found)
-    shown = text.split("<main ")[1].split('id="case"')[0]
+def test_no_pattern_where_the_papers_blocks_are_not(ensemble: pile_ensemble.Ensemble) -> None:
+    shown = ensemble_page.page(ensemble).split("<main ")[1].split('id="case"')[0]
     assert "pattern" not in shown and "Were the runs enough" in shown
     assert "All blocks let go, five runs" in shown and "Blocks without room, one run" in shown
     assert shown.index("Where blocks will lie") < shown.index("How much piles differ")
 
 
-def test_an_ensemble_without_a_title_bears_the_name_of_its_folder(tmp_path: Path) -> None:
-    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path / "my reef", ENDS[:1]), 0.002)
-    found.piles[0].run.__dict__["parameters"] = {}
-    assert "<h1>my reef: one run</h1>" in ensemble_page.page(found)
-
-
 def test_one_pile_is_an_ensemble(tmp_path: Path) -> None:
-    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, ENDS[:1]), 0.002)
+    """Without a title it bears the name of its folder."""
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path / "my reef", ENDS[:1]), 0.002)
     text = ensemble_page.page(found).replace("\u00a0", " ")
     assert "One block lies at x = 40, y = 50 mm. 100 % of them" in text
     assert re.search(r"The one complete pile is [0-9.]+ mm high", text)
+    found.piles[0].run.__dict__["parameters"] = {}
+    assert "<h1>my reef: one run</h1>" in ensemble_page.page(found)
 
 
 def test_each_choice_has_its_own_maps(tmp_path: Path) -> None:
