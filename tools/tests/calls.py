@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -62,3 +62,23 @@ def program(path: Path, text: str) -> Path:
     path.write_text(text)
     path.chmod(0o755)
     return path
+
+
+def stand_in(path: Path, run: str, check: str = "pass") -> Path:
+    """A program in the place of mics: what it does with the `text` of a case and the `folder` of
+    its results, and with --check; the tools and what is beside the tests are in its reach."""
+    folders = [str(folder) for folder in Path(__file__).parents[:2]]
+    head = f"#!{sys.executable}\nimport sys\nfrom pathlib import Path\nsys.path[:0] = {folders}\n"
+    words = f"words = sys.argv[1:]\nif '--check' in words:\n    {check}\n    sys.exit()\n"
+    case = "text, folder = Path(words[-1]).read_text(), Path(words[words.index('--output') + 1])\n"
+    return program(path, head + words + case + run)
+
+
+@contextlib.contextmanager
+def going_on(*words: object, **how: Any) -> Iterator[subprocess.Popen]:
+    """A program that runs, killed in the end."""
+    with subprocess.Popen([str(word) for word in words], **how) as running:
+        try:
+            yield running
+        finally:
+            running.kill()

@@ -7,6 +7,7 @@ with a standing wave. `write_run` takes the resting places, so tests can build a
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -98,6 +99,36 @@ def reword(folder: Path, change: Callable[[str], str]) -> Run:
             if name in ("namelist", "parameters"):
                 h5["provenance"].attrs[name] = change(text)
     return Run(folder)
+
+
+def change(folder: Path, at: str, attribute: str = "", **how: Any) -> None:
+    """Change an attribute, or the last number, of an object of run.h5; or put something else in
+    its place, by default nothing."""
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        if attribute:
+            h5[at].attrs[attribute] = how["value"]
+            return
+        if at in h5 and "last" not in how:
+            del h5[at]
+        if "last" in how:
+            h5[at][-1] = how["last"]
+        elif "group" in how:
+            h5.create_group(at)
+        elif link := how.get("link"):
+            h5[at] = h5py.SoftLink(*link) if len(link) == 1 else h5py.ExternalLink(*link)
+        elif "data" in how and "shape" in how:
+            h5[at] = np.broadcast_to(how["data"], how["shape"])
+        elif "data" in how:
+            h5[at] = how["data"]
+        elif "line" in how:
+            h5[at] = np.linspace(*how["line"])
+        elif "virtual" in how:
+            layout = h5py.VirtualLayout(shape=tuple(how["shape"]), dtype=float)
+            layout[:] = h5py.VirtualSource(how["virtual"], at, shape=layout.shape)
+            h5.create_virtual_dataset(at, layout)
+        elif how:
+            how = {word: tuple(v) if isinstance(v, list) else v for word, v in how.items()}
+            h5.create_dataset(at, dtype=float, **how)
 
 
 def with_bed(folder: Path, height: Callable[[Array, Array], Array]) -> Run:
