@@ -13,14 +13,14 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 import h5py
 import pytest
 
-from calls import MICS, mics_tools, needs_mics, until
-from calls import program as stand_in
+from calls import MICS, going_on, mics_tools, needs_mics, stand_in, until
+from calls import program as file_to_call
 from micstools.cases import settings
 from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
 from micstools.ensembles.ensemble import Plan
@@ -33,23 +33,14 @@ CASE = """\
 &drop shape = 'a' position = 0,0,0 spread = 0.1, 0.1, 0.0 /
 &drop shape = 'b' position = 0,0,0 /
 """
-# A stand-in: the first seed finds no room, the second fails at its first try, others settle.
+# The first seed finds no room, the second fails at its first try, others settle.
 PROGRAM = """\
-#!{python}
-import sys
-from pathlib import Path
-words = sys.argv[1:]
-if "--check" in words:
-    sys.stdin.read()
-    print("  time of the run         about 1 s")
-    sys.exit(0)
 import h5py
-text, folder = Path(words[-1]).read_text(), Path(words[words.index("--output") + 1])
 first = not folder.exists()
-if f"seed = {no_room}" in text:
+if "seed = NO_ROOM" in text:
     code, time = 3, 1.0
     print("mics: 2 due block(s) never found room", file=sys.stderr)
-elif f"seed = {fails}" in text and first:
+elif "seed = FAILS" in text and first:
     code, time = 3, 0.2
     print("mics: the velocity is not a number", file=sys.stderr)
 else:
@@ -64,11 +55,11 @@ sys.exit(code)
 
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
-    text = PROGRAM.replace("{python}", sys.executable)
-    for index, name in enumerate(("{no_room}", "{fails}")):
-        text = text.replace(name, str(ensemble.seed_of(1, index)))
+    first, second = (str(ensemble.seed_of(1, index)) for index in (0, 1))
+    text = PROGRAM.replace("NO_ROOM", first).replace("FAILS", second)
     (tmp_path / "case.nml").write_text(CASE)
-    return stand_in(tmp_path / "a mics", text)
+    check = 'print("  time of the run         about 1 s")'
+    return stand_in(tmp_path / "a mics", text, check)
 
 
 def call(program: Path, *words: str) -> int:
@@ -112,14 +103,8 @@ def test_other_runs_and_strange_folders_are_left_alone(
         fcntl.flock(lock, fcntl.LOCK_SH)
         assert call(program, *words, str(folder)) == 2
     assert "is in use by process" in capsys.readouterr().err
-
-
-def test_runs_without_chance_are_refused(tmp_path: Path, program: Path, capsys) -> None:
     (tmp_path / "case.nml").write_text(CASE.replace("spread = 0.1, 0.1, 0.0", ""))
-    out = ("--slurm", "--out", str(tmp_path / "out"))
-    assert call(program, "--runs", "2", *out) == 2
-    assert "nothing is left to chance" in capsys.readouterr().err
-    assert call(program, "--runs", "2", "--tilt", "5", *out) == 0
+    assert call(program, "--tilt", "5", *words, str(tmp_path / "out")) == 0
 
 
 def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:
@@ -136,34 +121,22 @@ def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:
     assert "stop_when_settled = .true." in small[0].text
 
 
-# A stand-in whose piles are the higher the larger the seed; it writes fields where it is to.
+# Piles are the higher the larger the seed; fields are written where they are to.
 PILES = """\
-#!{python}
-import re, sys
-from pathlib import Path
-words = sys.argv[1:]
-if "--check" in words:
-    sys.exit(0)
-sys.path[:0] = {folders}
-import h5py
+import re
 from synthetic import UPRIGHT, Motion, write_run
-text, folder = Path(words[-1]).read_text(), Path(words[words.index("--output") + 1])
 seed = int(re.search(r"seed = (\\d+)", text)[1])
 place = [([0.15, 0.05, 0.08 + 1e-11 * seed], UPRIGHT)]
 write_run(folder, Motion(t_end=1.0, history_step=0.5, cells=(6, 2, 4), places=place))
 if "field_interval = 0.0" in text:
     (folder / "fields.vtkhdf").unlink()
-with h5py.File(folder / "run.h5", "a") as h5:
-    h5["provenance"].attrs["exit_status"] = 0
 """
 
 
 @pytest.fixture
 def piles(tmp_path: Path) -> Path:
-    folders = repr([str(folder) for folder in Path(__file__).parents[:2]])
-    text = PILES.replace("{python}", sys.executable).replace("{folders}", folders)
     (tmp_path / "case.nml").write_text(CASE)
-    return stand_in(tmp_path / "mics", text)
+    return stand_in(tmp_path / "mics", PILES)
 
 
 def with_fields(folder: Path) -> list[str]:
@@ -228,16 +201,12 @@ def test_interval_of_a_share() -> None:
 
 
 def test_the_slurm_script_is_a_script(tmp_path: Path) -> None:
-    text = slurm.script(tmp_path / "a b", [1, 4], Path("/bin/echo"), ["time=1:00:00"])
-    assert "#SBATCH --array=1,4\n" in text and "#SBATCH --time=1:00:00\n" in text
-    (tmp_path / "a b" / "0004" / "result").mkdir(parents=True)
-    done = subprocess.run(
-        ["sh"],
-        input=text.replace("cd ", "SLURM_ARRAY_TASK_ID=4; cd ", 1),
-        capture_output=True,
-        text=True,
-    )
     folder = tmp_path / "a b" / "0004"
+    (folder / "result").mkdir(parents=True)
+    text = slurm.script(folder.parent, [1, 4], Path("/bin/echo"), ["time=1:00:00"])
+    assert "#SBATCH --array=1,4\n" in text and "#SBATCH --time=1:00:00\n" in text
+    text = text.replace("cd ", "SLURM_ARRAY_TASK_ID=4; cd ", 1)
+    done = subprocess.run(["sh"], input=text, capture_output=True, text=True)
     assert done.stdout == f"--quiet --output {folder}/result {folder}/case.nml\n"
 
 
@@ -254,16 +223,14 @@ def ensemble_words(case: str, folder: Path, runs: int, jobs: int) -> list[str]:
             "--runs", str(runs), "--jobs", str(jobs), "--out", str(folder)]  # fmt: skip
 
 
-def interrupted(folder: Path, restarts: int) -> str:
-    """Start an ensemble, press Ctrl-C once some restart files are there; what it said."""
-    call = ensemble_words("blocks.nml", folder, 3, 2)
-    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
-    try:
-        until(lambda: len(list(folder.glob("*/result/restart-*.h5"))) >= restarts)
-        running.send_signal(signal.SIGINT)
-        _, said = running.communicate(timeout=60)
-    finally:
-        running.kill()
+def begun(*words: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    return going_on(*words, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
+
+
+def press_ctrl_c(running: subprocess.Popen[str]) -> str:
+    """What a command says in the end."""
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=60)
     assert running.returncode == 130
     return said
 
@@ -280,7 +247,9 @@ def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) ->
     were left alone, one after the other."""
     (tmp_path / "blocks.nml").write_text(BLOCKS)
     stopped, whole = tmp_path / "stopped", tmp_path / "whole"
-    assert "stopped; the same command goes on" in interrupted(stopped, 2)
+    with begun(*ensemble_words("blocks.nml", stopped, 3, 2)) as running:
+        until(lambda: len(list(stopped.glob("*/result/restart-*.h5"))) >= 2)
+        assert "stopped; the same command goes on" in press_ctrl_c(running)
     assert set(outcomes(stopped)) <= {"interrupted", "missing", "settled"}
     assert "interrupted" in outcomes(stopped)
     assert subprocess.run(ensemble_words("blocks.nml", stopped, 3, 2)).returncode == 0
@@ -294,27 +263,14 @@ def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) ->
         assert (one.time == two.time).all() and (one.position == two.position).all()
 
 
-# Stand-ins for sbatch and scancel, qsub and qdel: the job begins at once, on this machine. Its end
-# is asked for, then made, as queues do: a worker of dask told twice to end may wait for ever.
-SUBMIT = """\
-#!/bin/sh
-if [ -e {folder}/full ]; then echo "the queue is full" >&2; exit 1; fi
-setsid sh "$(cp "$1" {folder}/job.$$ && echo {folder}/job.$$)" > {folder}/said.$$ 2>&1 &
-echo "Submitted batch job $!"
-"""
-CANCEL = """\
-#!/bin/sh
-kill -- -"$1"
-(sleep 3; kill -s KILL -- -"$1") > {folder}/said.$$ 2>&1 &
-"""
-
-
 @pytest.fixture
 def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The commands of two systems of queues."""
     folder = tmp_path / "queue"
-    for names, text in ((("sbatch", "qsub"), SUBMIT), (("scancel", "qdel"), CANCEL)):
+    for names, script in ((("sbatch", "qsub"), "submit"), (("scancel", "qdel"), "cancel")):
         for name in names:
-            stand_in(folder / name, text.replace("{folder}", str(folder)))
+            text = Path(__file__).with_name(f"queue_{script}.sh").read_text()
+            file_to_call(folder / name, text)
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
     return folder
 
@@ -343,43 +299,26 @@ def slow_runs(program: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
     program.write_text(slow)
     out = program.parent / "out"
     call = [*ensemble_words("case.nml", out, 2, 1), "--program", str(program), *words]
-    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
-    try:
+    with begun(*call) as running:
         until((out / "0001" / "log.txt").exists)
         time.sleep(0.5)
         yield running
         if running.poll() is None:
-            running.send_signal(signal.SIGINT)
-            running.wait(40)
-    finally:
-        running.kill()
-
-
-@pytest.mark.cost(10)
-def test_ctrl_c_reaches_the_runs_of_a_queue(tmp_path: Path, program: Path, queue: Path) -> None:
-    with slow_runs(program, "--cluster", "slurm") as running:
-        running.send_signal(signal.SIGINT)
-        _, said = running.communicate(timeout=40)
-    assert running.returncode == 130
-    assert said.splitlines()[-1] == "stopped; the same command goes on where each run stood"
-    assert "Traceback" not in said
-    assert "KeyboardInterrupt" in (tmp_path / "out" / "0001" / "log.txt").read_text()
+            press_ctrl_c(running)
 
 
 def listeners(said: Path) -> set[tuple[str, int]]:
     """Where those processes listen whose command line or environment has a path."""
-    sockets = set()
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):  # it has ended
-            words = (process / "cmdline").read_bytes() + (process / "environ").read_bytes()
-            if str(said).encode() in words:
-                sockets |= {str(end.readlink()) for end in (process / "fd").iterdir()}
-    lines = [line.split() for name in ("tcp", "tcp6")
-             for line in Path("/proc/net", name).read_text().splitlines()[1:]]  # fmt: skip
-    found = [line[1].split(":") for line in lines
-             if line[3] == "0A" and f"socket:[{line[9]}]" in sockets]  # fmt: skip
-    return {(socket.inet_ntoa(bytes.fromhex(address)[::-1]) if len(address) == 8 else "::1",
-             int(port, 16)) for address, port in found}  # fmt: skip
+    import psutil
+
+    found = set()
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):  # it has ended
+            words = [*process.cmdline(), *process.environ().values()]
+            if any(str(said) in word for word in words):
+                links = process.net_connections("inet")
+                found |= {tuple(link.laddr) for link in links if link.status == psutil.CONN_LISTEN}
+    return found
 
 
 def asks_for_a_certificate(address: tuple[str, int]) -> bool:
@@ -400,9 +339,11 @@ def test_runs_on_this_machine_listen_nowhere(tmp_path: Path, program: Path) -> N
 
 
 @pytest.mark.cost(10)
-def test_a_queue_lets_nobody_in(tmp_path: Path, program: Path, queue: Path) -> None:
+def test_a_queue_lets_nobody_in_and_ctrl_c_reaches_its_runs(
+    tmp_path: Path, program: Path, queue: Path
+) -> None:
     """Scheduler and worker want a certificate; its key lies in private files, no page is open."""
-    with slow_runs(program, "--cluster", "slurm"):
+    with slow_runs(program, "--cluster", "slurm") as running:
         found = listeners(tmp_path)
         outside = {place for place in found if place[0] != "127.0.0.1"}
         assert len({port for _, port in outside}) == 2  # of scheduler and worker
@@ -413,33 +354,27 @@ def test_a_queue_lets_nobody_in(tmp_path: Path, program: Path, queue: Path) -> N
                     urllib.request.urlopen(f"http://127.0.0.1:{port}{path}")
         keys = list((tmp_path / "out" / "jobs").glob(".*key*"))
         assert keys and all(path.stat().st_mode & 0o777 == 0o600 for path in keys)
+        said = press_ctrl_c(running)
+    assert said.splitlines()[-1] == "stopped; the same command goes on where each run stood"
+    assert "Traceback" not in said
+    assert "KeyboardInterrupt" in (tmp_path / "out" / "0001" / "log.txt").read_text()
     assert not list((tmp_path / "out" / "jobs").glob(".*key*"))
 
 
-def test_a_queue_that_takes_no_job_is_one_line(
-    tmp_path: Path, program: Path, queue: Path, capsys
+def test_a_queue_that_takes_no_job_or_is_not_here_is_one_line(
+    tmp_path: Path, program: Path, queue: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     words = ("--runs", "2", "--jobs", "2", "--out", str(tmp_path / "out"), "--cluster")
     (queue / "full").touch()
-    assert call(program, *words, "slurm") == 2
-    assert capsys.readouterr().err == (
-        "mics-tools ensemble: --cluster slurm: sbatch takes no job: the queue is full\n"
-    )
-    for wish, said in (
-        ("memory=much", "--cluster pbs: Could not interpret 'much' as a byte unit"),
-        ("--slurm", "give one"),
+    for system, said in (
+        (["slurm"], " slurm: sbatch takes no job: the queue is full"),
+        (["pbs", "memory=much"], " pbs: Could not interpret 'much' as a byte unit"),
+        (["pbs", "--slurm"], " runs, --slurm only writes a script: give one"),
     ):
-        assert call(program, *words, "pbs", wish) == 2
-        (line,) = capsys.readouterr().err.splitlines()
-        assert said in line
-
-
-def test_a_queue_that_is_not_here_is_one_line(
-    tmp_path: Path, program: Path, monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
+        assert call(program, *words, *system) == 2
+        assert capsys.readouterr().err == f"mics-tools ensemble: --cluster{said}\n"
     monkeypatch.setenv("PATH", str(tmp_path))
-    words = ("--runs", "2", "--out", str(tmp_path / "out"), "--cluster", "slurm")
-    assert call(program, *words) == 2
+    assert call(program, *words, "slurm") == 2
     assert "there is no sbatch on this machine" in capsys.readouterr().err
 
 
@@ -466,9 +401,8 @@ def test_a_file_beside_the_case_is_found_from_its_copies(
     for name in ("block.txt", "mound.txt"):
         Path(name).write_text("elsewhere")
     case = Path("study/case.nml")
-    case.write_text(
-        CASE + "&shape name = 'a' kind = 'file' file = 'block.txt' /\n&bed file = 'mound.txt' /\n"
-    )
+    more = "&shape name = 'a' kind = 'file' file = 'block.txt' /\n&bed file = 'mound.txt' /\n"
+    case.write_text(CASE + more)
     words = ("ensemble", str(case), "--program", str(program), "--runs", "1", "--slurm")
     assert mics_tools([*words, "--out", "out"]) == 0
     copy = Path("out/0001/case.nml").read_text()
@@ -480,18 +414,16 @@ def test_a_file_beside_the_case_is_found_from_its_copies(
 
 @pytest.mark.parametrize(
     ("said", "code", "calls"),
-    [
-        ("restart-b.h5: damaged; a run cannot go on from it", 4, ["b", "a", "new"]),
-        ("run.h5: has lost rows, the run cannot go on in it", 4, ["b", "a", "new"]),
-        ("fields.vtkhdf: cannot write: No space left on device", 4, ["b"]),
-        ("the case differs from that of the restart file", 2, ["b", "a", "new"]),
-    ],
-)
+    [("restart-b.h5: damaged; a run cannot go on from it", 4, "b a new "),
+     ("run.h5: has lost rows, the run cannot go on in it", 4, "b a new "),
+     ("fields.vtkhdf: cannot write: No space left on device", 4, "b "),
+     ("the case differs from that of the restart file", 2, "b a new ")],
+)  # fmt: skip
 def test_only_a_bad_restart_file_throws_a_run_back(
-    said: str, code: int, calls: list[str], tmp_path: Path
+    said: str, code: int, calls: str, tmp_path: Path
 ) -> None:
     """A disk that is full after hours is no reason to begin anew."""
-    program = stand_in(
+    program = file_to_call(
         tmp_path / "mics",
         f"#!{sys.executable}\nimport sys\nwords = sys.argv[1:]\n"
         f"open({str(tmp_path / 'calls')!r}, 'a').write("
@@ -504,4 +436,4 @@ def test_only_a_bad_restart_file_throws_a_run_back(
         (member.result / name).touch()
         os.utime(member.result / name, (1000 - age, 1000 - age))
     assert ensemble_engine.execute(member, program, tmp_path) == code
-    assert (tmp_path / "calls").read_text().split() == calls
+    assert (tmp_path / "calls").read_text() == calls
