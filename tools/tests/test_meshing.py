@@ -1,6 +1,7 @@
 """Surfaces to blocks: volumes kept, faults of drawings repaired with a warning or refused."""
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Callable
 from pathlib import Path
 
@@ -50,14 +51,12 @@ def test_hexapod_keeps_volume_inertia_and_facets(suffix: str, tmp_path: Path) ->
     assert len(shape.triangles) == 60
 
 
-def test_curved_block_keeps_its_volume(tmp_path: Path) -> None:
+def test_curved_blocks_keep_their_volumes(tmp_path: Path) -> None:
+    """A ball as it is drawn, and a cylinder of a STEP file within the element."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=30.0)
     surface = meshing.load(save(ball, tmp_path / "ball.stl"))
-    total = meshing.tet_volumes(meshing.fill(surface)).sum()
-    assert abs(total) == pytest.approx(ball.volume, rel=1e-6)
-
-
-def test_step_file_has_the_volume_of_its_form(tmp_path: Path) -> None:
+    total = abs(meshing.tet_volumes(meshing.fill(surface)).sum())
+    assert total == pytest.approx(ball.volume, rel=1e-6)
     path = step_file(tmp_path / "cylinder.step", ("Cylinder", 0, 0, 0, 0, 0, 60, 20))
     surface = meshing.load(path, 4.0)
     total = abs(meshing.tet_volumes(meshing.fill(surface)).sum())
@@ -66,12 +65,17 @@ def test_step_file_has_the_volume_of_its_form(tmp_path: Path) -> None:
         meshing.closed(surface.points, surface.triangles, 1.02 * total)
 
 
-def test_holes_are_filled_with_a_warning(tmp_path: Path) -> None:
-    mesh = hexapod_surface()
-    mesh.update_faces(np.arange(len(mesh.faces)) != 7)
-    surface = meshing.load(save(mesh, tmp_path / "holed.stl"))
-    assert surface.warnings == ["the surface was open at 3 edges; 1 plane hole was filled"]
-    assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
+def test_faults_are_mended_with_a_warning(tmp_path: Path) -> None:
+    holed, flipped = hexapod_surface(), hexapod_surface()
+    holed.update_faces(np.arange(len(holed.faces)) != 7)
+    flipped.faces[::7] = flipped.faces[::7, ::-1]
+    for mesh, told in (
+        (holed, "the surface was open at 3 edges; 1 plane hole was filled"),
+        (flipped, "some or all triangles were seen from inside; they were turned"),
+    ):
+        surface = meshing.load(save(mesh, tmp_path / "a.stl"))
+        assert surface.warnings == [told]
+        assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
 def test_plane_holes_of_any_form_are_filled_exactly(tmp_path: Path) -> None:
@@ -105,47 +109,51 @@ def test_holes_that_are_not_plane_are_refused() -> None:
         with pytest.raises(meshing.BadSurface, match=reason):
             meshing.closed(box.vertices, faces)
     assert outcomes == {0, 1, 2}
+    many = hexapod_surface()
+    with pytest.raises(meshing.BadSurface, match="surface is open"):
+        meshing.closed(many.vertices, many.faces[np.arange(len(many.faces)) % 3 > 0])
 
 
 def test_pieces_and_hollows_are_refused() -> None:
-    box = trimesh.creation.box((20, 20, 20))
-    apart = box.copy().apply_translation((50, 0, 0))
-    hollow = trimesh.creation.box((5, 5, 5))
+    small, hollow = trimesh.creation.box((5, 5, 5)), trimesh.creation.box((5, 5, 5))
     hollow.invert()
-    for second in (apart, hollow):
-        both = trimesh.util.concatenate([box, second])
-        with pytest.raises(meshing.BadSurface, match="surface is in 2 pieces"):
+    for second, said in (
+        (boxes((50, 0, 0)), "surface is in 2 pieces"),
+        (hollow, "surface is in 2 pieces"),
+        (small, "part 2 of 2 lies inside the others"),
+    ):
+        both = trimesh.util.concatenate([boxes((0, 0, 0)), second])
+        with pytest.raises(meshing.BadSurface, match=said):
             meshing.closed(both.vertices, both.faces)
 
 
-def test_a_surface_that_is_far_from_closed_is_refused(tmp_path: Path) -> None:
-    mesh = hexapod_surface()
-    mesh.update_faces(np.arange(len(mesh.faces)) % 3 > 0)
-    with pytest.raises(meshing.BadSurface, match="surface is open"):
-        meshing.load(save(mesh, tmp_path / "open.stl"))
+def points_and_triangles(obj: bytes) -> bytes:
+    return b"\n".join(line for line in obj.splitlines() if line.startswith((b"v ", b"f ")))
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("kind", "change"),
     [
-        str.upper,
-        lambda text: text.replace("endsolid", "ENDSOLID hexapod"),
-        lambda text: text.replace("endsolid", "end solid").replace("endloop", "End Loop"),
-        lambda text: "\ufeff" + text,
+        ("stl_ascii", bytes.upper),
+        ("stl_ascii", lambda b: b.replace(b"endsolid", b"ENDSOLID hexapod")),
+        (
+            "stl_ascii",
+            lambda b: b.replace(b"endsolid", b"end solid").replace(b"endloop", b"End Loop"),
+        ),
+        ("stl_ascii", lambda b: BOM_UTF8 + b),
+        ("obj", lambda b: BOM_UTF8 + points_and_triangles(b)),  # it hides no point
+        ("stl", lambda b: b + b"\n"),
+        ("stl", lambda b: b + bytes(49)),
     ],
-    ids=["capitals", "ENDSOLID", "end solid", "byte-order mark"],
 )
-def test_an_stl_of_any_writing_is_read(tmp_path: Path, change: Callable[[str], str]) -> None:
-    text = str(hexapod_surface().export(file_type="stl_ascii"))
-    (tmp_path / "a.stl").write_text(change(text), encoding="utf-8")
-    assert meshing.load(tmp_path / "a.stl").volume == pytest.approx(7 * D**3, rel=1e-6)
-
-
-def test_a_byte_order_mark_hides_no_point(tmp_path: Path) -> None:
-    lines = str(hexapod_surface().export(file_type="obj")).splitlines()
-    text = "\n".join(line for line in lines if line.startswith(("v ", "f ")))
-    (tmp_path / "a.obj").write_text("\ufeff" + text, encoding="utf-8")
-    assert meshing.load(tmp_path / "a.obj").volume == pytest.approx(7 * D**3, rel=1e-6)
+def test_a_file_of_any_writing_is_read(
+    tmp_path: Path, kind: str, change: Callable[[bytes], bytes]
+) -> None:
+    """Capitals, blanks, byte-order marks, and bytes behind the end."""
+    content = hexapod_surface().export(file_type=kind)
+    path = tmp_path / f"a.{kind[:3]}"
+    path.write_bytes(change(content.encode() if isinstance(content, str) else content))
+    assert meshing.load(path).volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["3mf", "ply", "off", "glb", "stl", "dae"])
@@ -155,13 +163,6 @@ def test_a_drawing_that_is_none_is_one_line(tmp_path: Path, kind: str, content: 
     path.write_bytes(content)
     with pytest.raises(meshing.BadSurface):
         meshing.load(path)
-
-
-@pytest.mark.parametrize("more", [b"\n", b"\0" * 49])
-def test_bytes_behind_a_binary_stl_are_passed_over(tmp_path: Path, more: bytes) -> None:
-    path = save(hexapod_surface(), tmp_path / "a.stl")
-    path.write_bytes(path.read_bytes() + more)
-    assert meshing.load(path).volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
 def test_a_surface_that_rounding_has_spoiled_is_refused(tmp_path: Path) -> None:
@@ -176,14 +177,6 @@ def test_a_surface_that_rounding_has_spoiled_is_refused(tmp_path: Path) -> None:
     ball.apply_translation((5e6 + 0.1, 0.0, 0.0))
     found = meshing.load(save(ball, tmp_path / "a.obj"))
     assert found.volume == pytest.approx(ball.volume, rel=1e-4)
-
-
-def test_flipped_triangles_are_turned_with_a_warning(tmp_path: Path) -> None:
-    mesh = hexapod_surface()
-    mesh.faces[::7] = mesh.faces[::7, ::-1]
-    surface = meshing.load(save(mesh, tmp_path / "flipped.stl"))
-    assert "seen from inside" in surface.warnings[0]
-    assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
 def boxes(*places: tuple[float, float, float]) -> "trimesh.Trimesh":
@@ -201,15 +194,10 @@ def test_overlapping_parts_are_united(tmp_path: Path) -> None:
     assert np.abs(meshing.tet_volumes(meshing.fill(surface))).sum() == pytest.approx(true, rel=1e-6)
     with pytest.raises(meshing.BadSurface, match="meets itself"):
         meshing.fill(meshing.Surface(both.vertices, both.faces, both.volume))
-
-
-def test_parts_that_were_seen_from_inside_are_united_too() -> None:
-    both = boxes((0, 0, 0), (10, 5, 3))
     whole, mixed = both.faces[:, ::-1], both.faces.copy()
     mixed[::5] = mixed[::5, ::-1]
-    for faces in (whole, mixed):
-        surface = meshing.closed(both.vertices, faces)
-        assert surface.volume == pytest.approx(2 * 20**3 - 10 * 15 * 17, rel=1e-9)
+    for faces in (whole, mixed):  # seen from inside
+        assert meshing.closed(both.vertices, faces).volume == pytest.approx(true, rel=1e-9)
 
 
 def test_round_parts_are_united(tmp_path: Path) -> None:
@@ -227,18 +215,10 @@ def test_round_parts_are_united(tmp_path: Path) -> None:
         own = np.abs((points @ turn[:3, :3])[:, 2]) < 30
         inside |= own & (np.linalg.norm((points @ turn[:3, :3])[:, :2], axis=1) < 8)
     share = float(inside.mean())
-    wanted = share * np.prod(high - low)
-    assert surface.volume == pytest.approx(
-        wanted, rel=4 * np.sqrt((1 - share) / share / 40000) + 0.02
-    )
+    rel = 4 * np.sqrt((1 - share) / share / 40000) + 0.02
+    assert surface.volume == pytest.approx(share * np.prod(high - low), rel=rel)
     shape, _ = meshing.block("cross", 1e-3 * meshing.fill(surface), 2300.0)
     assert shape.volume == pytest.approx(1e-9 * surface.volume, rel=1e-6)
-
-
-def test_a_part_inside_another_is_refused() -> None:
-    both = trimesh.util.concatenate([boxes((0, 0, 0)), trimesh.creation.box((5, 5, 5))])
-    with pytest.raises(meshing.BadSurface, match="part 2 of 2 lies inside the others"):
-        meshing.closed(both.vertices, both.faces)
 
 
 def test_solids_of_a_step_file_are_united(tmp_path: Path) -> None:
@@ -288,23 +268,20 @@ def test_plane_faces_are_simplified_without_a_change(tmp_path: Path) -> None:
     assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
-def test_millimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
+def test_other_units_read_as_metres_are_noticed(tmp_path: Path) -> None:
+    """Millimetres are refused, centimetres, as of a large block, told."""
     surface = meshing.load(save(hexapod_surface(), tmp_path / "block.stl"))
     with pytest.raises(meshing.BadSurface, match=r"60 m long.*--scale 0\.001"):
         meshing.scale_of(surface, None, None)
     assert meshing.scale_of(surface, None, 1e-3) == 1e-3
     assert meshing.scale_of(surface, 0.06, None) == pytest.approx(1e-3)
     assert surface.warnings == []
-
-
-def test_centimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
-    mesh = hexapod_surface()
-    mesh.apply_scale(0.1)
-    surface = meshing.load(save(mesh, tmp_path / "block.stl"))
-    assert meshing.scale_of(surface, None, None) == 1.0
-    assert re.search(r"6 m long.*in cm --scale 0\.01", surface.warnings[0])
-    small = meshing.Surface(surface.points / 100, surface.triangles, surface.volume / 1e6)
-    assert meshing.scale_of(small, None, None) == 1.0
+    large, small = (
+        meshing.Surface(surface.points / n, surface.triangles, surface.volume / n**3)
+        for n in (10, 1000)
+    )
+    assert meshing.scale_of(large, None, None) == meshing.scale_of(small, None, None) == 1.0
+    assert re.search(r"6 m long.*in cm --scale 0\.01", large.warnings[0])
     assert small.warnings == []
 
 
@@ -331,11 +308,9 @@ def test_the_command_simplifies_and_unites(tmp_path: Path, capsys) -> None:
     assert mics_tools(["shape", str(path), *words, "300"]) == 0
     said = capsys.readouterr()
     assert out.exists()
-    united, simplified = said.err.splitlines()
+    united, fewer = said.err.splitlines()
     assert re.fullmatch(r"warning: 2 parts were united: -\d+\.\d+% of .*", united)
-    assert re.fullmatch(
-        r"warning: \d+ triangles were simplified to \d+: .* of the volume", simplified
-    )
+    assert re.fullmatch(r"warning: \d+ triangles were simplified to \d+: .* of the volume", fewer)
     out.unlink()
     assert mics_tools(["shape", str(path), *words, "2"]) == 2 and not out.exists()
     (*_, line) = capsys.readouterr().err.splitlines()
