@@ -25,10 +25,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel that pip makes of a copy of the sources; nothing is fetched."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
-    listed = subprocess.run(
-        ["git", "ls-files", "-co", "--exclude-standard", "-z", "pyproject.toml", "tools", "docs"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+    words = ["git", "ls-files", "-co", "--exclude-standard", "-z",
+             "pyproject.toml", "tools", "docs"]  # fmt: skip
+    listed = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in filter(None, listed.split("\0")):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_symlink():
@@ -56,16 +55,15 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with zipfile.ZipFile(wheel) as file:
         file.extractall(folder)
     hidden = sorted({name for names in extras.PACKAGES.values() for name in names})
-    (folder / "sitecustomize.py").write_text(
-        "import sys\n"
-        f"for name in {[*hidden, 'vtkmodules']!r}:\n"
-        "    sys.modules[name] = None\n"
-    )  # fmt: skip
+    lines = ["import sys", *(f"sys.modules[{name!r}] = None" for name in [*hidden, "vtkmodules"])]
+    (folder / "sitecustomize.py").write_text("\n".join(lines))
     return folder
 
 
-def call(installed: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
-    return python("-m", "micstools.cli", *words, cwd=installed, tools=installed)
+def call(installed: Path, *words: str | Path, code: int = 0) -> subprocess.CompletedProcess[str]:
+    done = python(*words, cwd=installed, tools=installed)
+    assert done.returncode == code, done.stderr
+    return done
 
 
 def names_of(requirements: list[str], extra: str = "") -> set[str]:
@@ -86,15 +84,11 @@ def imports(path: Path, inside: bool) -> set[str]:
 
 
 def test_pip_installs_what_the_tools_import(metadata: Message) -> None:
-    files = [
-        path
-        for path in (ROOT / "tools" / "micstools").rglob("*.py")
-        if path.parent.name != "bench"  # runs other programs, from the sources only
-    ]
+    files = (ROOT / "tools" / "micstools").rglob("*.py")
+    files = [path for path in files if path.parent.name != "bench"]  # of the sources only
     needed = metadata.get_all("Requires-Dist", [])
     always = set().union(*(imports(path, inside=False) for path in files))
-    always_needed = always - {"aiohttp", "distributed", "dask-jobqueue"}
-    assert names_of(needed) == always_needed
+    assert names_of(needed) == always - {"aiohttp", "distributed", "dask-jobqueue"}
     offered = set().union(*(names_of(needed, extra) for extra in extras.PACKAGES))
     assert offered | always >= set().union(*(imports(path, inside=True) for path in files))
 
@@ -107,36 +101,29 @@ def test_extras_are_those_that_are_asked_for(metadata: Message) -> None:
     pinned = (ROOT / "requirements.txt").read_text()
     for name in names_of(needed) | names_of(needed, "pictures"):
         assert f"\n{name}==" in pinned, name
-    assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"] == {
-        "mics-tools": "micstools.cli:main"
-    }
+    about = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert about["scripts"] == {"mics-tools": "micstools.cli:main"}
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS)
 def test_every_command_helps_without_the_extras(installed: Path, name: str) -> None:
-    done = call(installed, name, "--help")
-    assert done.returncode == 0, done.stderr
+    call(installed, "-m", "micstools.cli", name, "--help")
 
 
-def test_an_installed_tool_makes_the_page(installed: Path, loose_pile: Run, tmp_path: Path) -> None:
-    """With its scripts, its style and the defaults of the case."""
+def test_an_installed_package_works(installed: Path, loose_pile: Run, tmp_path: Path) -> None:
+    """The page has its scripts, its style and the defaults of the case; cases and runs are read
+    into pandas and xarray, in any folder."""
     path = tmp_path / "page.html"
-    done = call(installed, "report", loose_pile.folder, "--out", path)
-    assert done.returncode == 0, done.stderr
+    call(installed, "-m", "micstools.cli", "report", loose_pile.folder, "--out", path)
     assert "What differs from the defaults" in path.read_text()
-
-
-def test_an_installed_package_reads_cases_and_runs(installed: Path, loose_pile: Run) -> None:
-    """Into pandas and xarray, in any folder."""
     program = (
         "import sys; from micstools import Case, Run\n"
         "case, run = Case.read(sys.argv[1]), Run(sys.argv[2])\n"
         "print(case.run.about('dt'), len(case.body), len(run.blocks), dict(run.fields.sizes))"
     )
-    words = ("-c", program, ROOT / "input" / "blocks_coarse.nml", loose_pile.folder)
-    done = python(*words, cwd=installed, tools=installed)
-    assert done.returncode == 0, done.stderr
-    assert "[s]" in done.stdout and f" 3 {401 * 9} " in done.stdout and "'time': 17" in done.stdout
+    case = ROOT / "input" / "blocks_coarse.nml"
+    said = call(installed, "-c", program, case, loose_pile.folder).stdout
+    assert "[s]" in said and f" 3 {401 * 9} " in said and "'time': 17" in said
 
 
 def test_defaults_are_those_of_the_schema(wheel: Path) -> None:
@@ -152,6 +139,6 @@ def test_defaults_are_those_of_the_schema(wheel: Path) -> None:
 def test_pictures_ask_for_their_packages(
     installed: Path, loose_pile: Run, words: list[str]
 ) -> None:
-    done = call(installed, words[0], loose_pile.folder, *words[1:])
-    (line,) = done.stderr.splitlines()
-    assert done.returncode == 2 and "pip install 'micstools[pictures]'" in line
+    words = ["-m", "micstools.cli", words[0], loose_pile.folder, *words[1:]]
+    (line,) = call(installed, *words, code=2).stderr.splitlines()
+    assert "pip install 'micstools[pictures]'" in line
