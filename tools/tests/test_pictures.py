@@ -1,6 +1,5 @@
 """Pictures and films show what they should; what is exported is read back by other programs."""
 
-import csv
 import json
 import os
 import signal
@@ -13,14 +12,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 import pytest
 import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from PIL import Image
+from PIL import Image, ImageSequence
 
-from calls import ROOT, mics_tools, python, until
+from calls import ROOT, going_on, mics_tools, python, until
 from micstools.pictures import exports, labels, movie, plots, reel, scene
 from micstools.pictures.movie import Film
 from micstools.reading.reader import BadRun, Run
@@ -34,6 +35,10 @@ def colours(path: Path) -> np.ndarray:
     return np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3).astype(int)
 
 
+def share_of_water(rgb: np.ndarray) -> float:
+    return ((rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)).mean()
+
+
 @can_draw
 @pytest.mark.parametrize("view", scene.VIEWS)
 def test_a_picture_shows_blocks_and_water(loose_pile: Run, tmp_path: Path, view: str) -> None:
@@ -41,8 +46,8 @@ def test_a_picture_shows_blocks_and_water(loose_pile: Run, tmp_path: Path, view:
     rgb = colours(full)
     reddish = (rgb[:, 0] > rgb[:, 1] + 60) & (rgb[:, 0] > rgb[:, 2] + 40)
     assert reddish.mean() > 0.01
-    bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
-    assert (bluish.mean() < 0.1) if view == "top" else (bluish.mean() > 0.2)  # water veils the pile
+    wet = share_of_water(rgb)
+    assert wet < 0.1 if view == "top" else wet > 0.2  # water veils the pile
 
 
 @can_draw
@@ -55,9 +60,8 @@ def test_the_water_of_a_light_run_is_drawn_at_rest(
     for view, wet in (("front", True), ("top", False)):
         for water in (True, False):
             style = scene.Style(width=300, water=water)
-            rgb = colours(scene.picture(Run(folder), 8.0, view, tmp_path / "a.png", style))
-            bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
-            assert (bluish.mean() > 0.2) == (wet and water)
+            path = scene.picture(Run(folder), 8.0, view, tmp_path / "a.png", style)
+            assert (share_of_water(colours(path)) > 0.2) == (wet and water)
 
 
 @can_draw
@@ -142,6 +146,7 @@ def test_figure_one(tmp_path: Path) -> None:
 
 def test_camera_holds_the_tank() -> None:
     low, high = np.zeros(3), np.array([0.3, 0.1, 0.2])
+    corners = np.array([[x, y, z] for x in (0, 0.3) for y in (0, 0.1) for z in (0, 0.2)])
     for view in scene.VIEWS:
         camera = scene.camera_for(low, high, view)
         towards = camera.position - camera.focus
@@ -149,13 +154,11 @@ def test_camera_holds_the_tank() -> None:
         right = np.cross([0, 0, 1], towards)
         right /= np.linalg.norm(right)
         up = np.cross(towards / distance, right)
-        for corner in np.array([[x, y, z] for x in (0, 0.3) for y in (0, 0.1) for z in (0, 0.2)]):
-            ahead = distance - (corner - camera.focus) @ towards / distance
-            height = abs((corner - camera.focus) @ up) / ahead
-            width = abs((corner - camera.focus) @ right) / ahead
-            half = np.tan(np.radians(camera.angle / 2))
-            assert height < half
-            assert width < half / camera.aspect
+        away = corners - camera.focus
+        ahead = distance - away @ towards / distance
+        half = np.tan(np.radians(camera.angle / 2))
+        assert (np.abs(away @ up) / ahead).max() < half
+        assert (np.abs(away @ right) / ahead).max() < half / camera.aspect
 
 
 def test_missing_libraries_end_the_program_with_the_command(monkeypatch, capsys) -> None:
@@ -234,16 +237,12 @@ def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
     assert said.out == f"{path}\n"
     assert "left out, not in the tank at the end: 6, 7, 8, 9" in said.err
     assert not (run.folder / "export" / "blocks.csv").exists()
-    with path.open() as file:
-        table = list(csv.DictReader(file))
+    table = pd.read_csv(path, dtype=str)
     heads = ["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"]
-    assert list(table[0]) == heads
-    assert [line["block"] for line in table] == ["1", "2", "3", "4", "5"]
-    for k, line in enumerate(table):
-        assert [float(line[name]) for name in ("x", "y", "z")] == b.position[-1, k].tolist()
-        turn = [float(line[name]) for name in ("qw", "qx", "qy", "qz")]
-        assert turn == b.quaternion[-1, k].tolist()
-        assert line["fixed"] == str(int(k < 3))
+    assert list(table) == heads and table.block.tolist() == ["1", "2", "3", "4", "5"]
+    assert table[heads[3:6]].astype(float).to_numpy().tolist() == b.position[-1, :5].tolist()
+    assert table[heads[6:]].astype(float).to_numpy().tolist() == b.quaternion[-1, :5].tolist()
+    assert table.fixed.tolist() == ["1", "1", "1", "0", "0"]
 
 
 Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # of the axes of glTF
@@ -254,6 +253,13 @@ def box_of(run: Run, row: int, blocks: int = 9, turn: np.ndarray | None = None) 
     points = np.concatenate([run.points(k, row) for k in range(blocks)])
     points = points if turn is None else points @ turn
     return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def closed_mesh(path: Path, volume: float) -> trimesh.Trimesh:
+    mesh = trimesh.load(path, force="mesh")
+    mesh.merge_vertices()
+    assert mesh.is_watertight and mesh.volume == pytest.approx(volume, rel=1e-5)
+    return mesh
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj"])
@@ -267,20 +273,17 @@ def test_the_pile_is_closed_and_each_block_has_its_name(
     assert names == [f"block-{k}" for k in range(1, 7)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        mesh = trimesh.load(path, force="mesh")
-    mesh.merge_vertices()
-    assert mesh.is_watertight and mesh.volume == pytest.approx(6 * 56e-6, rel=1e-5)
+        mesh = closed_mesh(path, 6 * 56e-6)
     assert mesh.bounds == pytest.approx(box_of(loose_pile, row, 6))
 
 
 def parts_of(path: Path) -> tuple[dict, bytes]:
     content = path.read_bytes()
-    magic, version, length = struct.unpack_from("<4sII", content)
-    assert (magic, version, length) == (b"glTF", 2, len(content))
-    size, kind = struct.unpack_from("<I4s", content, 12)
-    about, start = json.loads(content[20 : 20 + size]), 20 + size
-    assert kind == b"JSON" and content[start + 4 : start + 8] == b"BIN\0"
-    return about, content[start + 8 :]
+    magic, version, length, size, kind = struct.unpack_from("<4sIII4s", content)
+    assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON")
+    about, numbers = content[20 : 20 + size], content[20 + size :]
+    assert numbers[4:8] == b"BIN\0"
+    return json.loads(about), numbers[8:]
 
 
 def array_of(about: dict, numbers: bytes, number: int) -> np.ndarray:
@@ -295,9 +298,8 @@ def test_the_film_moves_each_block(loose_pile: Run, tmp_path: Path) -> None:
     path = exports.to_glb(loose_pile, 0, tmp_path)
     about, numbers = parts_of(path)
     b, film = loose_pile.bodies, about["animations"][0]
-    assert [node["name"] for node in about["nodes"]] == [f"block {k}" for k in range(1, 10)] + [
-        "tank"
-    ]
+    blocks = [f"block {k}" for k in range(1, 10)]
+    assert [node["name"] for node in about["nodes"]] == [*blocks, "tank"]
     found = {}
     for channel in film["channels"]:
         sampler = film["samplers"][channel["sampler"]]
@@ -314,13 +316,10 @@ def test_the_film_moves_each_block(loose_pile: Run, tmp_path: Path) -> None:
 
 
 def test_other_programs_read_the_film(loose_pile: Run, tmp_path: Path) -> None:
-    """As trimesh does: y is up there, and z runs to the viewer."""
+    """As trimesh does: y is up there, and z runs to the viewer. In coordinates of a survey places
+    count from a node at the corner of the tank: single precision holds them there."""
     found = trimesh.load(exports.to_glb(loose_pile, 0, tmp_path))
     assert found.bounds == pytest.approx(box_of(loose_pile, 0, turn=Y_UP), abs=1e-6)
-
-
-def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
-    """Places count from a node at the corner of the tank: single precision holds them there."""
     corner = (354200.0, 5621080.0, -12.0)
     run = Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=corner)))
     path = exports.to_glb(run, 0, tmp_path)
@@ -363,24 +362,16 @@ def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) 
 def test_each_shape_has_its_file(loose_pile: Run, tmp_path: Path) -> None:
     folder = exports.to_shapes(loose_pile, 0, tmp_path)
     assert [path.stem for path in folder.iterdir()] == list(loose_pile.shapes)
-    mesh = trimesh.load(folder / "hexapod.stl", force="mesh")
-    mesh.merge_vertices()
-    assert mesh.is_watertight and mesh.volume == pytest.approx(56e-6, rel=1e-5)
+    closed_mesh(folder / "hexapod.stl", 56e-6)
 
 
 has_ffmpeg = pytest.mark.skipif(not movie.encoder(), reason=movie.NO_ENCODER)
 has_ffprobe = pytest.mark.skipif(not movie.shutil.which("ffprobe"), reason="no ffprobe here")
 
 
-@pytest.mark.parametrize(
-    ("slow", "caption"),
-    [(1, "t = 2.50 s"), (4, "t = 2.50 s, 4 times slower"), (0.04, "t = 2.50 s, 25 times faster")],
-)
-def test_caption(slow: float, caption: str) -> None:
-    assert Film(slow=slow).caption(2.5) == caption
-
-
-def test_slow_motion_has_more_pictures(loose_pile: Run) -> None:
+def test_slow_motion_is_told_and_has_more_pictures(loose_pile: Run) -> None:
+    for factor, said in ((1, ""), (4, ", 4 times slower"), (0.04, ", 25 times faster")):
+        assert Film(slow=factor).caption(2.5) == f"t = 2.50 s{said}"
     assert len(Film().times(loose_pile)) == 8 * 25 + 1
     slow = Film(begin=1.0, end=2.0, slow=4, rate=10).times(loose_pile)
     assert len(slow) == 41 and slow[[0, -1]] == pytest.approx([1.0, 2.0])
@@ -397,11 +388,8 @@ def test_a_gif_moves(loose_pile: Run, tmp_path: Path, view: str) -> None:
     with Image.open(path) as found:
         assert found.n_frames == 4 and found.width == 160
         assert found.info["duration"] == 100
-        frames = []
-        for k in (0, 3):
-            found.seek(k)
-            frames.append(np.asarray(found.convert("RGB")).astype(int))
-    assert (np.abs(frames[0] - frames[1]).max(axis=2) > 60).mean() > 0.002
+        frames = [np.asarray(k.convert("RGB")).astype(int) for k in ImageSequence.Iterator(found)]
+    assert (np.abs(frames[0] - frames[3]).max(axis=2) > 60).mean() > 0.002
 
 
 @can_draw
@@ -489,12 +477,9 @@ def test_nothing_unfinished_is_left(
 @can_draw
 @has_ffmpeg
 def test_a_stopped_film_leaves_nothing(loose_pile: Run, tmp_path: Path) -> None:
-    words = ["-m", "micstools.cli", "movie", loose_pile.folder, "--out", tmp_path / "a.mp4"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
-    with subprocess.Popen(
-        [sys.executable, *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    ) as running:
-        assert running.stderr
+    words = (sys.executable, "-m", "micstools.cli", "movie", loose_pile.folder, "--out")
+    how = {"env": {**os.environ, "PYTHONPATH": str(ROOT / "tools")}, "stdout": subprocess.DEVNULL}
+    with going_on(*words, tmp_path / "a.mp4", stderr=subprocess.PIPE, **how) as running:
         running.stderr.readline()  # the first pictures are told
         until(lambda: list(tmp_path.iterdir()), 5)
         running.send_signal(signal.SIGTERM)
@@ -503,20 +488,16 @@ def test_a_stopped_film_leaves_nothing(loose_pile: Run, tmp_path: Path) -> None:
 
 
 @can_draw
-def test_a_reel_builds_nothing_twice(loose_pile: Run, monkeypatch) -> None:
+def test_a_reel_builds_nothing_twice(loose_pile: Run) -> None:
     """The water anew for each written time, all else once; blocks move all the same."""
     found = reel.Reel(loose_pile, 160, 0.6, water=True)
-    added: list[str] = []
-    add = type(found._plotter).add_mesh
-
-    def noted(self: object, *mesh: object, **look: object) -> object:
-        added.append(str(look.get("name", "")))
-        return add(self, *mesh, **look)
-
-    monkeypatch.setattr(type(found._plotter), "add_mesh", noted)
+    kind = type(found._plotter)
     camera = scene.camera_for(loose_pile.grid.low, loose_pile.grid.high, "front")
-    seen = [np.asarray(found.draw(t, camera)).astype(int) for t in (2.10, 2.14, 2.20, 2.60, 2.64)]
+    times = (2.10, 2.14, 2.20, 2.60, 2.64)
+    with patch.object(kind, "add_mesh", autospec=True, side_effect=kind.add_mesh) as add:
+        seen = [np.asarray(found.draw(t, camera)).astype(int) for t in times]
     found.close()
+    added = [call.kwargs.get("name", "") for call in add.call_args_list]
     assert added == 2 * list(scene.WATER_PARTS)
     assert (np.abs(seen[0] - seen[2]).max(axis=2) > 60).mean() > 0.002
 
