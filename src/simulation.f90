@@ -16,7 +16,7 @@ module simulation_m
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, lowering, kinetic_energy, potential_energy
-  use sling_m, only: hangs
+  use sling_m, only: hangs, brace
   use case_blocks_m, only: blocks_init, turn_with_fluid
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
@@ -169,7 +169,7 @@ contains
     do b = 1, sim%blocks%n
       if (.not. hangs(b, sim%blocks)) cycle
       sim%blocks%fixed(b) = .false.
-      sim%blocks%inverse_inertia(:, :, b) = 0.0_wp
+      call brace(sim%clock%dt, b, sim%blocks)
     end do
     if (sim%clock%step > 0) sim%initialised = sim%blocks%present
     if (sim%light%on .and. sim%clock%step > 0) call resume_light(sim%blocks, sim%light)

@@ -49,7 +49,7 @@ contains
     allocate (blocks%on_ground(n), source=.false.)
     allocate (blocks%status(n), source=to_come)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
-      blocks%lost(3, n), source=0.0_wp)
+      blocks%lost(3, n), blocks%upright(3, n), source=0.0_wp)
     allocate (blocks%path(n), blocks%ahead(2, n))
     blocks%ahead = 0.0_wp
     allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)

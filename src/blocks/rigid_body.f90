@@ -65,6 +65,7 @@ module rigid_body_m
     logical, allocatable :: on_ground(:)         !! (n) its height is found at the release
     real(wp), allocatable :: goal(:)             !! (n) height to which it is lowered at most [m]
     real(wp), allocatable :: sling(:)            !! (n) force of a sling on what hangs in it [N]
+    real(wp), allocatable :: upright(:, :)       !! (3, n) body axis that pointed up then [-]
     type(given_t) :: given                       !! at release; of fixed bodies for ever
     type(given_motion_t), allocatable :: path(:) !! (n) that moves a fixed body; 0 rows: none
     real(wp) :: time = 0.0_wp                    !! at which the bodies are where they are [s]

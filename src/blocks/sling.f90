@@ -1,32 +1,40 @@
-!> The sling of a crane that sets a block down: from the first touch on it holds the attitude of the
-!! block, and lowers it until it is slack.
+!> The sling of a crane that sets a block down: shortly above what lies below it slows down, and
+!! lowers the block until it is slack. It holds it as it hung the less the less it carries, so that
+!! the block comes to lie on what is below, and catches it where it slips.
 !!
-!! It is a spring with a dashpot, from the block up to an end that goes down at the speed of
-!! lowering; s is how much longer it is than at rest. It gives way by a share e of the smallest edge
-!! d under the weight W, and works on the s of the end of the step, so that any step is stable:
+!! It is a spring with a dashpot, from the block up to an end that goes down at a share of the speed
+!! of lowering while it carries something; s is how much longer it is than at rest. It gives way by a share e of the smallest edge
+!! d under the weight W. Its force T acts at the radius a of the block above the centre, along the
+!! body axis u that pointed up (z) when it began to hang. Forces and torques are those of the end of
+!! the step, so that any step is stable:
 !!
-!! $$ T = k s + c \dot s \ge 0, \quad k = W/(e d), \quad c = 2 \sqrt{k M} . $$
+!! $$ T = k s + c \dot s \ge 0, \quad k = W/(e d), \quad c = 2 \sqrt{k M}, $$
+!! $$ M_T = K u \times z - C \omega, \quad K = T a, \quad C = 2 \sqrt{K I} . $$
 module sling_m
   use kinds_m, only: wp
-  use vectors_m, only: inverse3
-  use rigid_body_m, only: blocks_t, release_body, lowering
+  use vectors_m, only: inverse3, rotation_matrix
+  use rigid_body_m, only: blocks_t, release_body, space_tensor, angular_velocity, lowering, &
+    fastest_point
   implicit none
   private
-  public :: hang, hangs, pull_sling, let_off, slack_share
+  public :: hang, hangs, pull_sling, brace, let_off, slack_share, slows_at
 
   real(wp), parameter :: gives_way = 0.01_wp     !! e [-]
-  real(wp), parameter :: beyond = 0.1_wp         !! way of the end on below the block, over d [-]
+  real(wp), parameter :: slows_at = 0.1_wp       !! of d: so high over what lies below [-]
+  real(wp), parameter :: slow = 0.1_wp           !! of the speed of lowering from there on [-]
   real(wp), parameter :: slack_share = 0.05_wp   !! of the weight: one that carries less is slack
 
 contains
 
-  !> Let a block that was moved down hang in its sling: it moves freely, but does not turn.
+  !> Let a block that was moved down hang in its sling.
   pure subroutine hang(b, blocks)
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
+    real(wp) :: turn(3, 3)
 
     blocks%fixed(b) = .false.
-    blocks%inverse_inertia(:, :, b) = 0.0_wp
+    turn = rotation_matrix(blocks%q(:, b))
+    blocks%upright(:, b) = turn(3, :)
     blocks%l(:, b) = 0.0_wp
     blocks%omega(:, b) = 0.0_wp
     blocks%goal(b) = blocks%x(3, b) + gives_way*blocks%shapes(blocks%shape(b))%smallest_edge
@@ -41,16 +49,17 @@ contains
       .and. blocks%goal(b) > -huge(1.0_wp)
   end function hangs
 
-  !> Lower the end of a sling by a step, and find its force in that step.
+  !> Lower the end of a sling by a step, find its force in that step and let its torque act.
   pure subroutine pull_sling(weight, dt, b, blocks)
     real(wp), intent(in) :: weight   !! of the block, less what the water carries [N]
     real(wp), intent(in) :: dt       !! [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
-    real(wp) :: k, c, rate, stretch
+    real(wp) :: down, k, c, rate, stretch, up(3)
 
-    associate (m => blocks%mass(b) + blocks%added_mass(b), &
-      down => blocks%handling(b)%lowering_speed)
+    down = 0.0_wp
+    if (.not. is_slack(weight, b, blocks)) down = slow*blocks%handling(b)%lowering_speed
+    associate (m => blocks%mass(b) + blocks%added_mass(b))
       k = max(weight, 0.0_wp)/(gives_way*blocks%shapes(blocks%shape(b))%smallest_edge)
       c = 2*sqrt(k*m)
       stretch = blocks%goal(b) - blocks%x(3, b)
@@ -58,21 +67,65 @@ contains
       blocks%sling(b) = max(0.0_wp, (k*stretch + (k*dt + c)*rate)/(1.0_wp + (k*dt + c)*dt/m))
       blocks%goal(b) = blocks%goal(b) - dt*down
     end associate
+    call brace(dt, b, blocks)
+    associate (q => blocks%q(:, b), l => blocks%l(:, b), omega => blocks%omega(:, b))
+      up = matmul(rotation_matrix(q), blocks%upright(:, b))
+      l = matmul(space_tensor(q, blocks%shapes(blocks%shape(b))%inertia), omega) &
+        + dt*lever(b, blocks)*[up(2), -up(1), 0.0_wp]
+      omega = angular_velocity(q, l, blocks%inverse_inertia(:, :, b))
+    end associate
   end subroutine pull_sling
 
-  !> Let a block off, with the velocity that it has, once its sling carries next to nothing and the
-  !! end has gone on for a while below the block.
+  !> How much harder a block turns in its sling: the inertia grows by dt C + dt^2 K, which are
+  !! those parts of the torque that the turn of the step changes.
+  pure subroutine brace(dt, b, blocks)
+    real(wp), intent(in) :: dt   !! [s]
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: inertia(3, 3), more
+    integer :: d
+
+    inertia = blocks%shapes(blocks%shape(b))%inertia
+    associate (k => lever(b, blocks))
+      more = dt*2*sqrt(k*(inertia(1, 1) + inertia(2, 2) + inertia(3, 3))/3) + dt**2*k
+    end associate
+    do d = 1, 3
+      inertia(d, d) = inertia(d, d) + more
+    end do
+    blocks%inverse_inertia(:, :, b) = inverse3(inertia)
+  end subroutine brace
+
+  !> K of a sling [N m].
+  pure real(wp) function lever(b, blocks)
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+
+    lever = blocks%sling(b)*blocks%shapes(blocks%shape(b))%radius
+  end function lever
+
+  !> Does the sling carry next to nothing, after it was pulled?
+  pure logical function is_slack(weight, b, blocks)
+    real(wp), intent(in) :: weight   !! [N]
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+
+    is_slack = blocks%sling(b) < slack_share*weight .and. blocks%goal(b) &
+      < blocks%x(3, b) + gives_way*blocks%shapes(blocks%shape(b))%smallest_edge
+  end function is_slack
+
+  !> Let a block off, with the velocity that it has, once its sling is slack and it lies still.
   pure subroutine let_off(weight, time, b, blocks)
     real(wp), intent(in) :: weight, time   !! as above [N], [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
 
     associate (shape => blocks%shapes(blocks%shape(b)))
-      if (.not. (blocks%sling(b) < slack_share*weight .and. blocks%goal(b) &
-        < blocks%x(3, b) - beyond*shape%smallest_edge)) return
+      if (.not. is_slack(weight, b, blocks) .or. fastest_point(blocks, b) &
+        > slow**2*blocks%handling(b)%lowering_speed) return
       blocks%sling(b) = 0.0_wp
       blocks%inverse_inertia(:, :, b) = inverse3(shape%inertia)
       blocks%given%v(:, b) = blocks%v(:, b)
+      blocks%given%omega(:, b) = blocks%omega(:, b)
     end associate
     call release_body(time, b, blocks)
   end subroutine let_off

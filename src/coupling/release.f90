@@ -22,7 +22,7 @@ module release_m
     left_out, out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, has_place, exclude
-  use sling_m, only: hang, hangs, let_off, slack_share
+  use sling_m, only: hang, hangs, let_off, slack_share, slows_at
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
@@ -149,7 +149,8 @@ contains
           call let_off(carried, time, b, blocks)
           cycle
         end if
-        gap = ground_gap*blocks%shapes(blocks%shape(b))%smallest_edge
+        gap = merge(slows_at, ground_gap, handling%release == 'set_down') &
+          *blocks%shapes(blocks%shape(b))%smallest_edge
         way = way_down(walls, blocks, b, overlap)
         left = way
         if (handling%release == 'height') left = max(0.0_wp, way - handling%release_height)

@@ -326,10 +326,10 @@ contains
 
     associate (s => blocks%shape(b))
       blocks%mass(b) = loaded_mass(light, blocks, b, light%wet(b))
+      if (hangs(b, blocks)) return   ! in its sling (`brace`)
       blocks%inverse_inertia(:, :, b) = light%inverse(:, :, s) &
         /growth(light, blocks, b, light%wet(b))
     end associate
-    if (hangs(b, blocks)) blocks%inverse_inertia(:, :, b) = 0.0_wp
   end subroutine load_block
 
   !> Buoyancy and drag of block b.

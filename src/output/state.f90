@@ -151,6 +151,7 @@ contains
     call list%add('/blocks/raised', 'm', blocks%raised)
     call list%add('/blocks/goal', 'm', blocks%goal)
     call list%add('/blocks/sling', 'N', blocks%sling)
+    call list%add('/blocks/upright', '-', blocks%upright)
     call list%add('/blocks/position', 'm', blocks%x)
     call list%add('/blocks/lost', 'm', blocks%lost)
     call list%add('/blocks/quaternion', '1', blocks%q)
