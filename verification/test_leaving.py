@@ -10,13 +10,15 @@ from micstools.reading import places
 from micstools.reading.reader import Run
 from shared_runs import told
 
-SLIDE = """&run physics = 'dry'  t_end = 1  dt = 0.01 /
+SLIDE = """&run physics = '{physics}'  t_end = 1  dt = 0.01 /
+&fluid water_level = 0.9 /
 &grid cells = 8, 8, 8  length = 1, 1, 1 /
 &boundary {side} /
 &shape name = 'a'  kind = 'cube'  size = 0.1 /
 &body shape = 'a'  position = 0.2, 0.2, 0.05 /
 &body shape = 'a'  position = {place}  velocity = {velocity} /
 """
+STREAM = "y_max = 'inflow'  y_max_velocity = 0, -1, 0  x_max = 'outflow'"
 RIVER = """&run t_end = 0.8  dt = 0.01  history_interval = 0 /
 &grid cells = 30, 12, 18  length = 0.6, 0.24, 0.36 /
 &boundary x_min = 'inflow'  x_min_velocity = 0.3, 0, 0  x_max = 'outflow'  z_max = 'open' /
@@ -32,18 +34,21 @@ def run(work: Path, case: str, *options: str) -> tuple[int, str, Run]:
 
 
 @pytest.mark.parametrize(
-    ("side", "place", "velocity", "axis", "at"),
+    ("physics", "side", "place", "velocity", "axis", "at"),
     [
-        ("x_max = 'open'", "0.8, 0.5, 0.5", "1.5, 0, 0", 0, 1.0),
-        ("y_min = 'open'", "0.5, 0.3, 0.5", "0, -2, 0", 1, 0.0),
+        ("dry", "x_max = 'open'", "0.8, 0.5, 0.5", "1.5, 0, 0", 0, 1.0),
+        ("dry", "y_min = 'open'", "0.5, 0.3, 0.5", "0, -2, 0", 1, 0.0),
+        ("light", STREAM, "0.8, 0.5, 0.5", "2.5, 0, 0", 0, 1.0),
+        ("light", STREAM, "0.5, 0.8, 0.5", "0, 2.5, 0", 1, 1.0),
     ],
 )
 def test_out_through_a_side(
-    side: str, place: str, velocity: str, axis: int, at: float, tmp_path: Path
+    physics: str, side: str, place: str, velocity: str, axis: int, at: float, tmp_path: Path
 ) -> None:
     """Within a step of the side it stops to count, with the place and the speed of then. The block
     at rest in the tank is the only one that is left."""
-    code, said, found = run(tmp_path, SLIDE.format(side=side, place=place, velocity=velocity))
+    case = SLIDE.format(physics=physics, side=side, place=place, velocity=velocity)
+    code, said, found = run(tmp_path, case)
     b = found.bodies
     assert code == 0 and said.count("is out") == 1, said
     assert list(b.status) == [2, 4]
@@ -78,7 +83,9 @@ def test_water_comes_in_its_place(tmp_path: Path) -> None:
 
 def test_a_restart_keeps_it_out(tmp_path: Path) -> None:
     """Gone on with from a file written after it went, the run has the same rows."""
-    case = SLIDE.format(side="x_max = 'open'", place="0.8, 0.5, 0.5", velocity="1.5, 0, 0")
+    case = SLIDE.format(
+        physics="dry", side="x_max = 'open'", place="0.8, 0.5, 0.5", velocity="1.5, 0, 0"
+    )
     _, _, whole = run(tmp_path, case)
     wanted = whole.bodies.position, whole.bodies.exit_time
     longer = case.replace("&run", "&run output = 'half'")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from micstools.reading.reader import Run
 from run_cases import ROOT
 from test_input import mics
 
@@ -75,6 +76,17 @@ def test_other_physics_is_tried_on_a_case_as_it_is(physics: str, tmp_path: Path)
     assert len(said) == len(passed)
     for line, start in zip(said, passed, strict=True):
         assert line.startswith(f"mics: warning: {start} meaning with physics = '{physics}'")
+
+
+def test_what_is_idle_is_not_taken(tmp_path: Path) -> None:
+    """A level without a surface, and how long to wait for a rest that ends nothing."""
+    text = """&run t_end = 0.001  dt = 0.001  rest_time = 9  field_interval = 0 /
+&grid cells = 4, 4, 4  length = 1, 1, 1 /
+&fluid single_phase = .true.  water_level = 0.5 /
+"""
+    assert mics(["--quiet"], tmp_path, text).returncode == 0
+    run = Run(tmp_path / "mics-out")
+    assert (run.value("run", "rest_time"), run.value("fluid", "water_level")) == (0.5, None)
 
 
 def test_warnings_stand_last(tmp_path: Path) -> None:

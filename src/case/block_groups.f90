@@ -31,12 +31,10 @@ contains
     call v%option('law', contact%law, 'restitution constants', 'where the forces come from: ' &
       //'restitution and contact_time, or, with model = ''spheres'', the ' &
       //'constants k_n to eta_t', example=spheres//law)
-    if (v%good('law')) then
-      call v%without_meaning(contact%law == 'restitution', &
-        'k_n gamma_n eta_n k_t gamma_t eta_t', 'law = ''restitution''', &
-        'only law = ''constants'' has them')
-      call v%without_meaning(contact%law == 'constants', 'restitution', 'law = ''constants''', &
-        'only law = ''restitution'' has it')
+    if (contact%law == 'restitution') then
+      call v%pass_over('k_n gamma_n eta_n k_t gamma_t eta_t', 'law = ''restitution''')
+    else
+      call v%pass_over('restitution', 'law = ''constants''')
     end if
     call v%require('law', contact%law == 'restitution' .or. contact%model == 'spheres', &
       'needs model = ''spheres''')
@@ -370,15 +368,13 @@ contains
       call v%option('release', handling%release, 'place height touch set_down', &
         'where a lowered block is let go: at its place, to which it comes from the water level ' &
         //'(without one the top of the tank); or, lowered from its place, at release_height over ' &
-        //'what lies below, or ' &
-        //'where it touches that; or set down there: its sling holds it upright until it carries ' &
-        //'less than 5 % of the weight under water', &
+        //'what lies below, or where it touches that; or set down there: its sling gives way to ' &
+        //'what it stands on, until it carries less than 5 % of the weight under water', &
         example='lowering_speed = 0.1  release = ''touch''')
       call v%require('release', lowered .or. handling%release == 'place', &
         'needs lowering_speed above 0')
-      call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
-        'release_height', 'release = '//quoted_text(trim(handling%release)), &
-        'only ''height'' has it')
+      if (handling%release /= 'height') call v%pass_over('release_height', &
+        'release = '//quoted_text(trim(handling%release)))
       if (handling%release == 'height') call v%needed('release_height', &
         'height over what lies below [m]')
       call v%real('release_height', handling%release_height, not_negative('m'), &

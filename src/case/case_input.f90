@@ -38,7 +38,7 @@ contains
     character(*), intent(in) :: text
     type(case_t), intent(out) :: case
     type(problems_t), intent(inout) :: problems
-    type(problems_t), intent(out), optional :: passed_over   !! given, but idle with `physics`
+    type(problems_t), intent(out), optional :: passed_over   !! what a switch leaves idle
     type(group_text_t), allocatable :: list(:)
     type(group_visitor_t) :: v
     character(name_length), allocatable :: shapes(:)
@@ -81,6 +81,10 @@ contains
       is_given(case%bed%friction))
     problems = v%problems
     if (present(passed_over)) passed_over = v%passed_over
+    if (case%fluid%single_phase) then   ! the liquid fills the whole tank
+      deallocate (case%water)
+      allocate (case%water(0))
+    end if
     if (case%run%physics /= 'fluid') return
     deallocate (case%shape, case%body, case%drop)   ! fluid alone
     allocate (case%shape(0), case%body(0), case%drop(0))
@@ -278,7 +282,7 @@ contains
     !! it.
     subroutine check_given_water()
       character(*), parameter :: light = 'physics = ''light'' '
-      integer :: i, d, s
+      integer :: i
 
       call v%start_empty('fluid')
       i = first_of(list, 'fluid')
@@ -297,14 +301,7 @@ contains
       i = first_of(list, 'boundary')
       if (i == 0) return
       call v%start(list(i))
-      do d = 1, 3
-        do s = 1, 2
-          if (case%boundary%faulty(s, d)) cycle
-          call v%require(side_name(s, d), all(case%boundary%kind(s, d) /= ['inflow ', 'outflow']), &
-            light//'has no stream through a side; the current is &fluid velocity')
-        end do
-      end do
-      call v%require('z_min', case%boundary%kind(1, 3) /= 'open', &
+      call v%require('z_min', all(case%boundary%kind(1, 3) /= ['open   ', 'inflow ', 'outflow']), &
         light//'keeps its water, the floor cannot be open')
       call v%require('z_max', case%boundary%kind(2, 3) /= 'periodic', &
         light//'has a level, z cannot be periodic')
@@ -313,13 +310,14 @@ contains
     !> Look through all groups of a case that has been read: one warning for all groups of a name
     !! without a meaning, then one for each group with variables without one.
     subroutine find_idle()
-      character(:), allocatable :: chosen, groups, subject
+      character(:), allocatable :: chosen, groups, subject, why
       integer :: i, k, n, line
 
       chosen = 'physics = '''//trim(case%run%physics)//''''
       groups = ''
       if (case%run%physics == 'fluid') groups = 'contact start shape body drop'
       if (any(case%run%physics == ['dry  ', 'light'])) groups = 'water numerics'
+      if (has_flow(case%run) .and. case%fluid%single_phase) groups = trim('water '//groups)
       associate (names => words_of(groups))
         do k = 1, size(names)
           n = 0
@@ -330,17 +328,15 @@ contains
           end do
           subject = '&'//trim(names(k))//': has'
           if (n > 1) subject = to_text(n)//' groups &'//trim(names(k))//': have'
-          if (n > 0) call v%passed_over%add_message(subject//' no meaning with '//chosen &
+          why = chosen
+          if (names(k) == 'water' .and. has_flow(case%run)) why = 'single_phase = .true.'
+          if (n > 0) call v%passed_over%add_message(subject//' no meaning with '//why &
             //', passed over', line)
         end do
       end associate
       do i = 1, size(list)
         call v%start(list(i))
         call v%pass_over(idle_variables(list(i)%name), chosen)
-        if (list(i)%name == 'water' .and. case%fluid%single_phase .and. has_flow(case%run)) then
-          call v%report(': has no meaning with &fluid single_phase = .true.; the liquid fills ' &
-            //'the whole tank')
-        end if
         list(i) = v%group
       end do
     end subroutine find_idle
@@ -356,7 +352,7 @@ contains
       select case (trim(case%run%physics)//' '//group)
       case ('dry run', 'light run'); names = 'cfl_max'
       case ('fluid run'); names = 'stop_when_settled rest_speed rest_time'
-      case ('dry boundary'); names = velocities_of('inflow')
+      case ('dry boundary', 'light boundary'); names = velocities_of('inflow')
       case ('fluid boundary'); names = velocities_of('slip')
       case ('dry fluid'); names = 'liquid_density liquid_viscosity gas_density gas_viscosity ' &
         //'water_level surface_tension single_phase velocity initial_state'

@@ -163,8 +163,9 @@ contains
     end if
   end subroutine require
 
-  !> Variables that have no meaning if `idle`, because of what was chosen: each that is given is a
-  !! problem, and its entry is idle. To be called before they are read.
+  !> Variables that have no meaning if `idle`, because of the kind or the form of what the group
+  !! describes: each that is given is a problem, and its entry is idle. To be called before they are
+  !! read.
   subroutine without_meaning(self, idle, variables, chosen, remedy)
     class(group_visitor_t), intent(inout) :: self
     logical, intent(in) :: idle
@@ -183,8 +184,8 @@ contains
     end associate
   end subroutine without_meaning
 
-  !> Variables that have no meaning because of the physics, or the solver, that was chosen: those
-  !! given are passed over with a warning, see `find_idle`.
+  !> Variables that a switch leaves idle: those given are passed over with a warning, so that one
+  !! word switches. To be called before they are read, but for the physics (`find_idle`).
   subroutine pass_over(self, variables, chosen)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variables   !! one blank between them
@@ -274,7 +275,7 @@ contains
       end do
       problem = allowed%problem(pack(values, is_given(values)))
       if (len(problem) > 0) call self%fault(i, problem)
-      if (self%good(variable)) x = values
+      if (self%good(variable) .and. .not. self%entry(self%n)%idle) x = values
     end if
     self%entry(self%n)%number = pack(x, is_given(x))
   end subroutine real_values

@@ -67,8 +67,7 @@ contains
       //'slower than rest_speed during rest_time')
     call v%real('rest_speed', run%rest_speed, positive('m/s'), &
       'speed below which a block counts as at rest', example='5e-4')
-    call v%without_meaning(.not. run%stop_when_settled .and. v%good('stop_when_settled'), &
-      'rest_time', 'stop_when_settled = .false.', 'only .true. waits for it')
+    if (.not. run%stop_when_settled) call v%pass_over('rest_time', 'stop_when_settled = .false.')
     call v%real('rest_time', run%rest_time, not_negative('s'), &
       'how long every block must be that slow for stop_when_settled', &
       example='stop_when_settled = .true.  rest_time = 1')
@@ -168,9 +167,8 @@ contains
     call v%about('water and air: what they are made of, and where they are at the start')
     call v%logical('single_phase', fluid%single_phase, 'the liquid fills the whole tank, there ' &
       //'is no gas')
-    call v%without_meaning(fluid%single_phase, &
-      'gas_density gas_viscosity water_level surface_tension', 'single_phase = .true.', &
-      'there is no gas and no surface')
+    if (fluid%single_phase) call v%pass_over( &
+      'gas_density gas_viscosity water_level surface_tension', 'single_phase = .true.')
     call v%real('liquid_density', fluid%liquid_density, &
       between(lightest, 1.0_wp/lightest, 'kg/m3'), 'density of the liquid', example='1025')
     call v%real('liquid_viscosity', fluid%liquid_viscosity, not_negative('Pa s'), &
@@ -219,8 +217,8 @@ contains
     call v%option('coupling', numerics%coupling, 'monolithic mics', 'fluid and blocks: pressure ' &
       //'and rigid motions in one solve, or the mass-averaged mixture of the paper', &
       example='''mics''')
-    call v%without_meaning(numerics%coupling == 'monolithic' .and. v%good('coupling'), &
-      'coupling_passes', 'coupling = ''monolithic''', 'only ''mics'' makes passes')
+    if (numerics%coupling == 'monolithic') call v%pass_over('coupling_passes', &
+      'coupling = ''monolithic''')
     call v%integer('coupling_passes', numerics%coupling_passes, between(1, 1000), &
       'passes of projection and rigid motion in a step, for coupling = ''mics'' only', &
       example='coupling = ''mics''  coupling_passes = 3')
@@ -234,8 +232,8 @@ contains
     call v%option('solid_fraction', numerics%solid_fraction, 'exact subcell', &
       'share of a cell that is block: from clipped tetrahedra, or counted in the sub-cells of ' &
       //'the paper', example='''subcell''')
-    call v%without_meaning(numerics%solid_fraction == 'exact' .and. v%good('solid_fraction'), &
-      'subcells', 'solid_fraction = ''exact''', 'only ''subcell'' counts sub-cells')
+    if (numerics%solid_fraction == 'exact') call v%pass_over('subcells', &
+      'solid_fraction = ''exact''')
     call v%integer('subcells', numerics%subcells, between(1, 32), 'sub-cells in each direction ' &
       //'of a cell, for solid_fraction = ''subcell''', &
       example='solid_fraction = ''subcell''  subcells = 8')

@@ -5,6 +5,7 @@ module case_warnings_m
   use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use case_blocks_m, only: turning_share
+  use case_plan_m, only: place_text
   use bed_m, only: bed_t, facet_within, max_clip_corners
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
@@ -93,8 +94,8 @@ contains
         call warnings%add_message('&bed file = '//quoted_text(case%bed%file)//': '// &
           brief(100.0_wp*share, 2)//' % of it is steeper than the ' &
           //brief(atan(mu)*180.0_wp/pi, 3)//' degrees that friction = '//to_text(mu) &
-          //' holds, near x, y = '//brief(middle(1), 3) &
-          //', '//brief(middle(2), 3)//' m '//brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3) &
+          //' holds, near x, y = '//place_text(middle(1), length) &
+          //', '//place_text(middle(2), length)//' m '//brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3) &
           //' degrees: blocks slide there', case%bed%line)
       end associate
     end associate
