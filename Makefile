@@ -173,7 +173,7 @@ endif
 
 deps = FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
 deps:
-	@$(deps) shape ensemble survey serve
+	@$(deps) shape ensemble survey serve paper
 
 # How threads wait, and in which pages memory comes: measured in docs/performance.md.
 run bench: export GOMP_SPINCOUNT ?= 1000
@@ -187,7 +187,7 @@ run: deps
 	$(PYTHON) -m micstools.cli report $(CASE)
 
 test:
-	@$(deps) test shape ensemble survey serve
+	@$(deps) test shape ensemble survey serve paper
 	+@verification/run_tests
 
 verify: deps
@@ -195,7 +195,7 @@ verify: deps
 	@$(PYTHON) verification/verify.py
 
 mutate:
-	@$(deps) test shape ensemble survey serve
+	@$(deps) test shape ensemble survey serve paper
 	@$(PYTHON) verification/mutate.py
 
 soak:

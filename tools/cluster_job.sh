@@ -1,6 +1,6 @@
 #!/bin/sh
 # A run on many processes under Slurm; hand it in again and again until the run is at its end:
-#   sbatch --nodes=4 tools/cluster_job.sh harbour.nml harbour-out
+#   sbatch --nodes=4 tools/cluster_job.sh case.nml case-out
 #SBATCH --job-name=mics
 #SBATCH --nodes=4
 #SBATCH --ntasks-per-node=16

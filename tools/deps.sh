@@ -1,7 +1,8 @@
 #!/bin/sh
 # Install what is missing: compiler, HDF5, MPI, drawing libraries; Python packages in .venv.
 # Does nothing, quickly, when everything is there. `deps.sh shape test` also installs what
-# requirements-shape.txt and requirements-test.txt name, and the libraries that Gmsh asks for.
+# requirements-shape.txt and requirements-test.txt name, and the libraries that Gmsh asks for; `paper`
+# those of WeasyPrint.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 extras=$*
@@ -35,6 +36,11 @@ missing() {
           library libXrender.so.1 || echo libxrender1
           library libXft.so.2 || echo libxft2
           library libXinerama.so.1 || echo libxinerama1 ;;
+      esac
+      case $extras in
+        *paper*)   # WeasyPrint
+          library libpangoft2-1.0.so.0 || echo libpango-1.0-0 libpangoft2-1.0-0
+          library libharfbuzz-subset.so.0 || echo libharfbuzz-subset0 ;;
       esac ;;
   esac
 }

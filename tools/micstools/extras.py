@@ -11,6 +11,7 @@ PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
     "ensemble": ("cryptography", "dask_jobqueue", "distributed"),
     "survey": ("ezdxf", "rasterio"),
+    "paper": ("weasyprint",),
     "pictures": ("pyvista", "vtk"),
     "serve": ("aiohttp",),
 }

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 
-def write(path: Path, text: str) -> None:
-    """Write a text file so that a crash or a full disk leaves the old or the new one. Links stay
+def write(path: Path, text: str | bytes) -> None:
+    """Write a file so that a crash or a full disk leaves the old or the new one. Links stay
     links, and mode and owner stay those of the file that was there: one that a new file cannot
     stand for (of another owner, of several names, in a closed folder) is written in place."""
-    place, content = path.resolve(), text.encode()
+    place, content = path.resolve(), text if isinstance(text, bytes) else text.encode()
     old = place.stat() if place.exists() else None
     if old and not stat.S_ISREG(old.st_mode):  # a terminal, a pipe
         place.write_bytes(content)

@@ -12,6 +12,7 @@ from PIL import Image
 
 from browser import Browser
 from micstools.pages import motion, parts, run_page
+from micstools.piles.options import Options
 from micstools.reading.reader import Run
 from synthetic import UPRIGHT, Motion, with_bed, write_run
 
@@ -20,7 +21,7 @@ FLAT = ("front", "side", "top")
 
 def save(run: Run, path: Path, north: float | None = None) -> Path:
     """The page of a run in a file."""
-    path.write_text(run_page.page(run, north))
+    path.write_text(run_page.page(run, Options(north=north)))
     return path
 
 
@@ -88,7 +89,7 @@ def test_contacts_that_come_and_go_stay() -> None:
 def test_north_is_given_or_said_to_be_y(make_run, capsys) -> None:
     run = make_run(Motion(t_end=0.1))
     assert parts.NORTH_IS_Y in run_page.page(run)
-    page = run_page.page(run, 30.0)
+    page = run_page.page(run, Options(north=30.0))
     assert parts.NORTH_IS_Y not in page and '"north":30.0' in page
 
 

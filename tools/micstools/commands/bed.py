@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from micstools.shapes import height_maps
+from micstools.shapes import height_maps, stones
 
 
 def work(given: argparse.Namespace) -> int:
@@ -20,6 +20,8 @@ def work(given: argparse.Namespace) -> int:
               "plan and of places --crs", file=sys.stderr)  # fmt: skip
     missing = found.missing
     found = height_maps.moved(height_maps.filled(found, given.fill), (x, y, z), given.scale)
+    if given.stones:
+        found = stones.lay(found, given.stones, given.seed)
     given.out.parent.mkdir(parents=True, exist_ok=True)
     height_maps.write(given.out, found, f"heights of {given.file.name} [m]")
     print(height_maps.report(found))

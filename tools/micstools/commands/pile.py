@@ -11,7 +11,8 @@ import h5py
 import numpy as np
 
 from micstools import command, files
-from micstools.piles import layer, maps, pile, pile_ensemble, pile_form, pile_numbers, placing
+from micstools.piles import maps, options, pile, pile_ensemble, pile_form, pile_numbers, placing
+from micstools.piles.handover import Handover
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.piles.placing import Area
 from micstools.reading import block_numbers, units
@@ -46,8 +47,6 @@ def work(given: argparse.Namespace) -> int:
             raise BadRun("--paper: for one run, not for an ensemble")
         box, area = box_of(given.box), area_of(given.area)
         return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area))
-    if given.area:
-        raise BadRun("--area: for an ensemble, not for one run")
     return _of_run(given)
 
 
@@ -57,8 +56,11 @@ def _of_run(given: argparse.Namespace) -> int:
     box = box_of(given.box)
     findings(given)
     run = command.open_run(given.run)
+    told = options.told(run.folder, given)
+    told.corners(run)  # refused before anything is written
+    options.keep(told, run.folder)
     step = given.step or maps.usual_step(run)
-    numbers, chosen = pile_numbers.numbers(run, step, box=box), units.of_run(run)
+    numbers, chosen = pile_numbers.numbers(run, step, box=box, told=told), units.of_run(run)
     found = asdict(numbers)
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
@@ -67,9 +69,9 @@ def _of_run(given: argparse.Namespace) -> int:
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
     found["note"] = run.note
-    if measured := layer.of_run(run):
-        print(ascii_of("\n".join(f"     {line}" for line in layer.words(measured[1], chosen))))
-        found["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
+    handed = Handover(run, told)
+    print(ascii_of("\n".join(f"     {line}" for line in handed.words(chosen))))
+    found |= handed.about
     found["units"] = pile_numbers.si_units(found)
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
@@ -92,11 +94,15 @@ def _of_ensemble(ensemble: Ensemble) -> int:
             shares = pile_ensemble.pattern_shares(part.piles)
             said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
             print(head + ", ".join(said))
-        print(f"numbers of the {len(part.whole)} complete piles of {total}: median (5 to 95 %)")
+        print(f"numbers of the {len(part.whole)} complete piles of {total}:")
+        print(f"     {'':20}median [its 95 % interval] (5 to 95 % of the piles)")
         for name, spread in pile_ensemble.spreads(part).items():
             unit = pile_numbers.unit(chosen, name)
-            low, high = (unit.figure(spread[k], 5) for k in ("5 %", "95 %"))
-            print(ascii_of(f"     {name:20}{unit.text(spread['median'], 5)} ({low} to {high})"))
+            low, high, first, last = (
+                unit.figure(spread[k], 5) for k in ("5 %", "95 %", "median low", "median high")
+            )
+            median = unit.text(spread["median"], 5)
+            print(ascii_of(f"     {name:20}{median} [{first} to {last}] ({low} to {high})"))
     path = files.write_table(ensemble.folder / "pile.csv", pile_ensemble.rows(ensemble))
     if ensemble.whole:
         # The maps; where variables were varied in a group for each choice, named by it

@@ -10,10 +10,10 @@ import numpy as np
 from contourpy import contour_generator
 
 from micstools import command, extras, files
-from micstools.commands.pile import area_of, write_json
-from micstools.piles import handover, layer, pile_ensemble
+from micstools.commands.pile import write_json
+from micstools.piles import drawing, handover, options, pile_ensemble
 from micstools.piles.handover import Handover
-from micstools.piles.layer import Corners
+from micstools.piles.options import Options
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.reading import places, units
 from micstools.reading.places import Survey
@@ -21,7 +21,8 @@ from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import ascii_of
 from micstools.shapes import height_maps
 
-FORMATS = (*handover.WRITERS, "asc")
+WRITERS = handover.WRITERS | {"svg": drawing.write, "pdf": drawing.write}
+FORMATS = (*WRITERS, "asc")
 CONTOURS = (0.1, 0.5, 0.9)
 """Probabilities of cover that lines are drawn around."""
 
@@ -33,16 +34,19 @@ def work(given: argparse.Namespace) -> int:
             raise BadRun(f"--to {given.to}: '{word}' is none of {', '.join(FORMATS)}")
     if given.crs:
         handover.crs_name(given.crs)
-    survey = Survey((*given.origin,), given.north, given.crs)
-    if "asc" in formats and survey.north:
-        raise BadRun("--to asc: a raster has its rows along east; with --north there is none")
     if "dxf" in formats:
         extras.need("survey")
-    if pile_ensemble.is_ensemble(given.run):
-        if given.area or given.layers:
-            raise BadRun("--area, --layers: for one run, not for an ensemble")
-        return _of_ensemble(given, formats, survey)
-    return _of_run(given, formats, survey)
+    ensemble = pile_ensemble.is_ensemble(given.run)
+    if ensemble and (given.area or given.layers):
+        raise BadRun("--area, --layers: for one run, not for an ensemble")
+    of_results = given.run if ensemble else command.open_run(given.run).folder
+    found = options.told(of_results, given)
+    if not ensemble:
+        found.corners(Run(of_results))
+    if "asc" in formats and found.survey.north:
+        raise BadRun("--to asc: a raster has its rows along east; with --north there is none")
+    options.keep(found, of_results)
+    return (_of_ensemble if ensemble else _of_run)(given, formats, found)
 
 
 def ask_for_system(run: Run, survey: Survey) -> None:
@@ -54,30 +58,17 @@ def ask_for_system(run: Run, survey: Survey) -> None:
           "notes it; without it a GIS takes GeoJSON for degrees", file=sys.stderr)  # fmt: skip
 
 
-def _corners(values: list[float] | None, run: Run) -> Corners | None:
-    area = area_of(values)
-    if area is None:
-        return None
-    low, high = run.grid.low[:2], run.grid.high[:2]
-    if (np.array(area.low) < low).any() or (np.array(area.high) > high).any():
-        raise BadRun(f"--area {' '.join(f'{v:g}' for v in values or [])}: the tank reaches from "
-                     f"{low.tolist()} to {high.tolist()} m")  # fmt: skip
-    return area.low, area.high
-
-
-def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
-    run = command.open_run(given.run)
+def _of_run(given: argparse.Namespace, formats: list[str], chosen: Options) -> int:
+    run, survey = command.open_run(given.run), chosen.survey
     if not run.bodies.n:
         raise BadRun(f"{run.folder} holds no blocks: there are no places")
-    area = _corners(given.area, run)
     ask_for_system(run, survey)
     folder = given.out or run.folder
     folder.mkdir(parents=True, exist_ok=True)
-    found = places.places(run, survey)
-    measured = layer.of_run(run, layers=given.layers, area=area)
-    maps = measured[0] if measured else None
-    handed, shown = Handover(run, survey, found, maps), units.of_run(run)
+    handed, shown = Handover(run, chosen), units.of_run(run)
+    found, maps = handed.places, handed.maps
     about: dict[str, Any] = {"survey": asdict(survey), "columns": places.MEANING}
+    about |= handed.about
     # How many units lie still
     free = [p for p in found if not p.fixed]
     out = [str(p.unit) for p in free if p.exit_time == p.exit_time]
@@ -87,14 +78,7 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
           + (f"; moving: {some(moving)}" if moving else "")
           + (f"; out of the tank: {some(out)}" if out else "")
           + (f"; not released: {some(waiting)}" if waiting else ""))  # fmt: skip
-    if measured:
-        about["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
-        within = places.within(
-            found, given.tolerance or places.TOLERANCE * measured[1].nominal_diameter
-        )
-        about["within"] = asdict(within) | {"share": within.share}
-        print(ascii_of(places.share_words(within, shown.length)))
-        print(ascii_of("\n".join(layer.words(measured[1], shown))))
+    print(ascii_of("\n".join(handed.words(shown))))
     for name in formats:
         path = folder / f"places.{name}"
         if name == "asc":
@@ -104,7 +88,7 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
                 for file, surface in ((path, maps.ball), (mean, maps.seen)):
                     print(handover.raster(file, surface + level, survey, maps.low, maps.step))
         else:
-            print(handover.WRITERS[name](handed, path))
+            print(WRITERS[name](handed, path))
     write_json(folder / "places.json", about)
     return 0
 
@@ -115,22 +99,21 @@ def some(numbers: list[str]) -> str:
     return ", ".join(numbers[:10]) + (f" and {more} more" if more > 0 else "")
 
 
-def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
+def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options) -> int:
     """A table of all places, one of the landings of each unit; the other files for each choice."""
-    whole = pile_ensemble.open_ensemble(given.run)
+    whole, survey = pile_ensemble.open_ensemble(given.run), chosen.survey
     folder = given.out or whole.folder
     folder.mkdir(parents=True, exist_ok=True)
     all_places, all_landings, about = [], [], []
     ask_for_system(whole.example.run, survey)
     for number, part in enumerate(whole.parts, start=1):
         stem = "places" if len(whole.parts) == 1 else f"places-{number}"
-        each, tolerance = pile_ensemble.places_of(part, survey, given.tolerance)
+        each, tolerance = pile_ensemble.places_of(part, survey, chosen.tolerance)
         found = places.landings(each, tolerance)
         within = places.within([p for one in each for p in one], tolerance)
-        print(
-            (f"{part.name}: " if part.name else "")
-            + ascii_of(places.share_words(within, part.units.length))
-        )
+        if places.has_plan(part.example.run):
+            head = f"{part.name}: " if part.name else ""
+            print(head + ascii_of(places.share_words(within, part.units.length)))
         choice = part.choices[0]
         all_places += [{"run": p.number} | choice | places.row_of(row)
                        for p, one in zip(part.piles, each, strict=True) for row in one]  # fmt: skip

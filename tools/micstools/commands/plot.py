@@ -23,9 +23,10 @@ def draw_pictures(given: argparse.Namespace) -> int:
     speed = scene.arrow_speed(run, times, views)
     style = scene.Style(width=given.width, speed=speed)
     for view in views:
-        pictures = [
-            scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style) for t in times
-        ]
+        pictures = []
+        for number, t in enumerate(times, start=1):
+            print(f"{view} at {t:g} s, {number} of {len(times)}", flush=True)
+            pictures.append(scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style))
         plots.contact_sheet(pictures, out / f"{view}.png", columns=min(4, len(pictures)))
         many = "1 picture" if len(pictures) == 1 else f"{len(pictures)} pictures"
         print(f"{many} and a sheet: {out / f'{view}.png'}")

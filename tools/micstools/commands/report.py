@@ -1,28 +1,31 @@
-"""One page of a run or of an ensemble."""
+"""One page of a run or of an ensemble, and the same on paper."""
 
 import argparse
 
-from micstools import command, files
+from micstools import command, extras, files
 from micstools.commands.pile import area_of
-from micstools.pages import ensemble_page, run_page
-from micstools.piles import pile_ensemble
-from micstools.reading.reader import BadRun
-
-NORTH_HELP = """direction of north in the plan, from +y towards +x; default: +y is taken as north,
-and the page says so"""
+from micstools.pages import ensemble_page, paper, run_page
+from micstools.piles import handover, options, pile_ensemble
 
 
 def work(given: argparse.Namespace) -> int:
+    if given.pdf:
+        extras.need("paper")
+    if given.crs:
+        handover.crs_name(given.crs)
     if pile_ensemble.is_ensemble(given.run):
-        folder = given.run
-        found = pile_ensemble.open_ensemble(folder, area=area_of(given.area))
-        text = ensemble_page.page(found, given.north)
-    elif given.area:
-        raise BadRun("--area: for an ensemble, not for one run")
+        folder, area = given.run, area_of(given.area)
+        given.area = None  # of the layer, for one run
+        told = options.told(folder, given)
+        text = ensemble_page.page(pile_ensemble.open_ensemble(folder, area=area), told)
     else:
         run = command.open_run(given.run)
-        folder, text = run.folder, run_page.page(run, given.north)
+        folder, told = run.folder, options.told(run.folder, given)
+        text = run_page.page(run, told)
+    options.keep(told, folder)
     path = given.out or folder / "report.html"
     files.write(path, text)
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")
+    if given.pdf:
+        print(paper.write(path.with_suffix(".pdf"), text))
     return 0

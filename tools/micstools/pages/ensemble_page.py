@@ -15,6 +15,7 @@ from micstools.pages.html import Markup, data, document, download, markup, secti
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
 from micstools.piles import pile, pile_ensemble, placing
+from micstools.piles.options import Options
 from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Pile
 from micstools.reading import health, places
 from micstools.reading.health import Check
@@ -59,10 +60,9 @@ _QUANTITIES = (
 )
 
 
-def page(ensemble: Ensemble, north: float | None = None) -> str:
-    """The page of an ensemble as text. `north`: its direction in the plan, degrees from +y towards
-    +x."""
-    run = ensemble.example.run
+def page(ensemble: Ensemble, told: Options = Options()) -> str:  # noqa: B008 (it is frozen)
+    """The page of an ensemble as text."""
+    run, north = ensemble.example.run, told.north
     title = f"{run_words.title(run, ensemble.folder)}: {count(len(ensemble.piles), 'run')}"
     return document(
         title,
@@ -70,7 +70,7 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
         *(tag("p", sentence(part), class_="lead") for part in ensemble.parts),
         tag("p", assumptions(ensemble)),
         *([_plan(ensemble)] if ensemble.whole else []),
-        _landings(ensemble),
+        _landings(ensemble, told),
         *([_patterns(ensemble)] if ensemble.has_patterns else []),
         *([_histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
@@ -206,17 +206,17 @@ def _plan(ensemble: Ensemble) -> Markup:
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
 
 
-def _landings(ensemble: Ensemble) -> Markup:
+def _landings(ensemble: Ensemble, told: Options) -> Markup:
     """Where each unit lands, for each choice of the varied variables."""
     length, place, parts = ensemble.units.length, ensemble.units.place, []
     heads: list[object] = ["unit", "landings", f"mean x, y [{length.name}]",
                            f"half axes of the ellipse [{length.name}]", "long one heads [°]",
                            "within the tolerance"]  # fmt: skip
     for part in ensemble.parts:
-        each, tolerance = pile_ensemble.places_of(part)
+        each, tolerance = pile_ensemble.places_of(part, told.survey, told.tolerance)
         if not (found := places.landings(each, tolerance)):
             continue
-        within = places.within([p for one in each for p in one], tolerance)
+        plan = places.has_plan(part.example.run)
         rows: list[list[object]] = [
             [
                 f"{k.unit} {k.name}".strip(),
@@ -224,15 +224,19 @@ def _landings(ensemble: Ensemble) -> Markup:
                 f"{place.figure(k.x)}, {place.figure(k.y)}",
                 f"{length.figure(k.long)}, {length.figure(k.short)}",
                 number(k.heading_deg, ".0f"),
-                in_words(k.within.count, k.within.units),
+                *([in_words(k.within.count, k.within.units)] if plan else []),
             ]
             for k in found
         ]
-        head = f"{part.name}: " if part.name else ""
-        parts += [tag("p", head + places.share_words(within, length)), table(heads, rows)]
+        said = [part.name] if part.name else []
+        if plan:
+            within = places.within([p for one in each for p in one], tolerance)
+            said.append(places.share_words(within, length))
+        columns = heads if plan else heads[:-1]
+        parts += [tag("p", ": ".join(said)), table(columns, rows)]
     note = f"The ellipse holds {100 * places.ELLIPSE:.0f} % of normally distributed landings with "
     note += "the same mean and covariance; headings go from +y towards +x. In brackets: share and "
-    note += "its 95 % interval. mics-tools places writes it in coordinates of a survey."
+    note += "its 95 % interval."
     return section("landings", "Where each unit lands", *parts, tag("p", note, class_="note"))
 
 

@@ -51,16 +51,17 @@ def section(name: str, title: str, *content: object) -> Markup:
                aria_labelledby=f"{name}-title")  # fmt: skip
 
 
-def table(heads: list[object], rows: list[list[object]], numbers: bool = True) -> Markup:
+def table(heads: list[object], rows: list[list[object]], numbers: bool = True,
+          kind: str = "") -> Markup:  # fmt: skip
     """A table that scrolls by itself where it is wider than the window; `numbers`: all columns but
-    the first are figures."""
+    the first are figures; `kind`: a class of its own."""
     head = tag("thead", tag("tr", *(tag("th", h, scope="col") for h in heads)))
     body = [
         tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:]))
         for row in ([_told(cell) for cell in row] for row in rows)
     ]
-    kind = "figures" if numbers else None
-    return tag("div", tag("table", head, tag("tbody", *body), class_=kind), class_="scroll",
+    kind = f"{kind} figures".strip() if numbers else kind
+    return tag("div", tag("table", head, tag("tbody", *body), class_=kind or None), class_="scroll",
                tabindex=0)  # fmt: skip
 
 

@@ -22,20 +22,27 @@ from micstools.pages.html import (
 from micstools.pages.parts import north_note, number, player, swatch
 from micstools.pages.run_words import count
 from micstools.pages.views import Sheet, bed_of, block_colours
-from micstools.piles import layer, maps, pile, pile_numbers
+from micstools.piles import drawing, layer, maps, pile, pile_numbers
+from micstools.piles.handover import Handover
+from micstools.piles.options import Options
 from micstools.piles.pile_numbers import PileNumbers
 from micstools.reading import block_numbers, health, places, scales, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
+from micstools.reading.places import Within
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
 
 _START = """
 const runPlayer = startPlayer(document.getElementById('player'));
 if (runPlayer) runPlayer.load(read('scene'));
+for (const box of document.querySelectorAll('.filter')) box.addEventListener('input', () => {
+  for (const row of box.closest('section').querySelectorAll('.units tbody tr'))
+    row.hidden = !row.textContent.toLowerCase().includes(box.value.toLowerCase());
+});
 """
-_MANY = 16  # blocks with a curve of their own
+_MANY = 100  # blocks with a curve of their own
 
 
 @dataclass(frozen=True)
@@ -47,10 +54,9 @@ class Found:
     units: Units
 
 
-def page(run: Run, north: float | None = None) -> str:
-    """The page of a run as text; without blocks it tells of the case and of the numbers only.
-    `north`: its direction in the plan, degrees from +y towards +x."""
-    title = run_words.title(run)
+def page(run: Run, told: Options = Options()) -> str:  # noqa: B008 (it is frozen)
+    """The page of a run as text; without blocks it tells of the case and of the numbers only."""
+    title, north = run_words.title(run), told.north
     chosen = units.of_run(run)
     case = section("case", "The case", *(tag("p", words) for words in run_words.case(run, chosen)))
     last = (_settings(run), _provenance(run))
@@ -64,18 +70,20 @@ def page(run: Run, north: float | None = None) -> str:
         )
         return document(title, tag("h1", title), tag("p", lead, class_="lead"), case,
                         _health(run, chosen), *last, script="")  # fmt: skip
-    numbers = pile_numbers.numbers(run, maps.usual_step(run))
+    numbers = pile_numbers.numbers(run, maps.usual_step(run), told=told)
     found = Found(numbers, block_numbers.of_blocks(run), chosen)
+    corner, sides = _pile(run, chosen)
     return document(
         title,
         tag("h1", title),
         tag("p", outcome(run, found), class_="lead"),
         player("player", "the fall of the blocks; arrow keys turn it, + and - zoom, space plays"),
         north_note(north),
+        corner,
         _facts(run, found),
         case,
-        _pile(run, chosen),
-        _places(run, chosen),
+        sides,
+        _places(Handover(run, told), chosen),
         _blocks(run, found),
         _health(run, chosen),
         *last,
@@ -143,8 +151,8 @@ def percent(share: float) -> str:
     return "–" if share != share else f"{100 * share:.0f} %"
 
 
-def _pile(run: Run, shown: Units) -> Markup:
-    """The pile of the end from three sides."""
+def _pile(run: Run, shown: Units) -> tuple[Markup, Markup]:
+    """The pile of the end from a corner, for paper, and from three sides."""
     bodies = present_bodies(run, -1)
     # The mean level of the water at the end; the one it should have where no field was written
     level = pile.water_level(run).found if pile.has_level(run) else pile.still_level(run)
@@ -162,22 +170,23 @@ def _pile(run: Run, shown: Units) -> Markup:
     words = "All views have one scale; blocks bear their numbers where enough of them is seen, "
     words += "fixed ones are grey."
     words += " The dashed line is the water level." if level is not None else ""
-    return section("pile", "The pile at the end", tag("div", *drawn, class_="views"),
-                   tag("p", words, class_="note"))  # fmt: skip
+    return sheet.corner(bodies, colours), section(
+        "pile", "The pile at the end", tag("div", *drawn, class_="views"),
+        tag("p", words, class_="note"),
+    )  # fmt: skip
 
 
-def _places(run: Run, shown: Units) -> Markup:
-    """Where units lie, and the layer that they form."""
-    found, length = places.places(run), shown.length
-    measured = layer.of_run(run)
-    said = layer.words(measured[1], shown) if measured else []
-    if measured:
-        diameter = measured[1].nominal_diameter
-        within = places.within(found, places.TOLERANCE * diameter)
-        said.insert(0, places.share_words(within, length))
+_FILTER = tag("input", class_="filter no-print", type="search", placeholder="show units with …",
+              aria_label="show units with these letters")  # fmt: skip
+
+
+def _places(given: Handover, shown: Units) -> Markup:
+    """Where units lie, and the layer that they form; where there is a plan, beside that."""
+    length, found, within = shown.length, given.places, given.within
     heads: list[object] = ["unit", *(["name"] if any(p.name for p in found) else []),
                            f"x, y, z [{length.name}]", "heading [°]", "tilt [°]",
-                           f"deviation [{length.name}]", "at rest", "touches"]  # fmt: skip
+                           *([f"deviation [{length.name}]"] if within else []),
+                           "at rest", "touches"]  # fmt: skip
     rows: list[list[object]] = [
         [
             p.unit,
@@ -185,15 +194,15 @@ def _places(run: Run, shown: Units) -> Markup:
             ", ".join(shown.place.figure(v) for v in (p.x, p.y, p.z)),
             number(p.heading_deg, ".0f"),
             number(p.tilt_deg, ".0f"),
-            "fixed" if p.fixed else length.figure(p.deviation),
+            *(["fixed" if p.fixed else shown.place.figure(p.deviation)] if within else []),
             "yes" if p.at_rest else "no",
             p.touching or "–",
         ]
         for p in found
     ]
     take = tag("p", "To take along: ", download("places.csv", "text/csv", places.csv_text(found),
-               "all places as CSV"), "; mics-tools places writes GeoJSON and DXF, in coordinates "
-               "of a survey.", class_="no-print")  # fmt: skip
+               "all places as CSV"), "; mics-tools places writes GeoJSON, DXF and the drawings.",
+               class_="no-print")  # fmt: skip
     meaning = [tag("li", f"{name}: {words.removesuffix(' [m]')}") for name, words in
                (*places.MEANING.items(), *layer.DEFINITIONS.items())]  # fmt: skip
     defined = tag(
@@ -201,8 +210,37 @@ def _places(run: Run, shown: Units) -> Markup:
         tag("summary", "What these numbers mean; in files in SI units"),
         tag("ul", *meaning),
     )
-    return section("places", "Where units lie", *(tag("p", words) for words in said),
-                   table(heads, rows), take, defined)  # fmt: skip
+    return section("places", "Where units lie", *(tag("p", words) for words in given.words(shown)),
+                   *_drawings(given), *(_farther_off(given, within, shown) if within else []),
+                   _FILTER, table(heads, rows, kind="units"), take, defined)  # fmt: skip
+
+
+def _drawings(given: Handover) -> list[Markup]:
+    """Plan and section."""
+    if not given.measured:
+        return []
+    drawn = (
+        (drawing.plan(given), "plan, planned beside built"),
+        (drawing.section(given), "section"),
+    )
+    return [tag("figure", tag("img", src=drawing.uri(found), alt=words), tag("figcaption", words),
+                class_="sheet") for found, words in drawn]  # fmt: skip
+
+
+def _farther_off(given: Handover, within: Within, shown: Units) -> list[Markup]:
+    """The units out of tolerance, the farthest first."""
+    off = [p for p in given.places if not p.fixed and not p.deviation <= within.tolerance]
+    off.sort(key=lambda p: -p.deviation)
+    if not off:
+        return []
+    rows: list[list[object]] = [
+        [f"{p.unit} {p.name}".strip(), *(shown.place.figure(v) for v in
+         (p.deviation, p.x - p.plan_x, p.y - p.plan_y, p.z - p.plan_z)), number(p.tilt_deg, ".0f")]
+        for p in off
+    ]  # fmt: skip
+    heads: list[object] = ["out of tolerance", f"deviation [{shown.length.name}]", "to the east",
+                           "to the north", "up", "tilt [°]"]  # fmt: skip
+    return [table(heads, rows)]
 
 
 def _blocks(run: Run, found: Found) -> Markup:
@@ -214,7 +252,7 @@ def _blocks(run: Run, found: Found) -> Markup:
                            f"x, y, z at the end [{length.name}]"]  # fmt: skip
     rows: list[list[object]] = [
         [
-            swatch(colours[k.block], k.block),
+            swatch(colours[k.block], f"{k.block}\u00a0{run.bodies.name[k.block - 1]}".strip()),
             figure(k.released),
             figure(k.at_rest),
             figure(k.impact_speed),
@@ -228,7 +266,8 @@ def _blocks(run: Run, found: Found) -> Markup:
     ]
     note = "At rest: the time after which a block stays where it ends. Forces are means over a "
     note += "time step; the force of the water includes buoyancy."
-    return section("blocks", "Fall and forces of each block", table(heads, rows),
+    return section("blocks", "Fall and forces of each block", _FILTER,
+                   table(heads, rows, kind="units"),
                    tag("p", note, class_="note"), *curves(run, found.units))  # fmt: skip
 
 
@@ -253,7 +292,7 @@ def curves(run: Run, shown: Units) -> list[Markup]:
         if np.isfinite(values).any():
             drawn.append(charts.lines(each, "time [s]", name))
     few = f"The first {_MANY} of {b.dropped.size} blocks." if b.dropped.size > _MANY else ""
-    names = [(order, f"block {k + 1}") for order, k in enumerate(chosen)]
+    names = [(order, b.name[k] or f"block {k + 1}") for order, k in enumerate(chosen)]
     return [tag("div", *drawn, class_="charts"), charts.key(names), tag("p", few, class_="note")]
 
 

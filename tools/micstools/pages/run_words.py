@@ -214,6 +214,8 @@ def contact(run: Run) -> str:
     said = f"Blocks touch by {model.get(kind, kind)} with a friction of "
     said += f"{run.value('contact', 'friction'):.3g} on each other and "
     said += f"{run.value('contact', 'wall_friction'):.3g} on walls and floor"
+    on_bed = run.value("bed", "friction") if run.parameters.get("bed") else None
+    said += f", {on_bed:.3g} on the bed" if on_bed is not None else ""
     if run.value("contact", "law") == "restitution":
         said += f", and spring back with {run.value('contact', 'restitution'):.3g} of "
         said += "their speed"

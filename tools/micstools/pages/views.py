@@ -4,6 +4,7 @@ draws it; and maps of the plan. No OpenGL is needed."""
 import base64
 import io
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,9 @@ VIEWS = {
     "front": (np.array([1, 0, 0]), np.array([0, 0, 1]), np.array([0, -1, 0])),
     "side": (np.array([0, 1, 0]), np.array([0, 0, 1]), np.array([1, 0, 0])),
     "top": (np.array([1, 0, 0]), np.array([0, 1, 0]), np.array([0, 0, 1])),
-}
+    "corner": (np.array([0.8, -0.6, 0]), np.array([0.3, 0.4, 0.75**0.5]),
+               np.array([-0.75**0.5 * 0.6, -0.75**0.5 * 0.8, 0.5])),
+}  # fmt: skip
 NAMES = {"front": ("x", "z"), "side": ("y", "z"), "top": ("x", "y")}
 _LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
 FIXED = "#8d8d8d"
@@ -47,8 +50,8 @@ def look(surfaces: dict[int, Array], view: str, low: Array, high: Array, step: f
     """What is seen of surfaces, triangles (m, 3, 3) by the number of their block from 0, in the
     box from `low` to `high` (3)."""
     axes = np.array(VIEWS[view], float)
-    corner = np.minimum(axes @ low, axes @ high)
-    far = np.maximum(axes @ low, axes @ high)
+    corners = np.array(list(product(*zip(low, high, strict=True)))) @ axes.T
+    corner, far = corners.min(axis=0), corners.max(axis=0)
     n = np.maximum(1, np.ceil((far[:2] - corner[:2]) / step - 1e-9).astype(int))
     depth = np.full((n[1], n[0]), -np.inf)
     block, light = np.zeros(depth.shape, dtype=np.int64), np.zeros(depth.shape)
@@ -161,6 +164,21 @@ class Sheet:
             below = ground(self.bed, view, self.low, self.high, self.step)
             picture = Image.alpha_composite(below, picture)
         return picture, seen
+
+    def corner(self, bodies: dict[int, Placed], colours: dict[int, str]) -> Markup:
+        """Blocks and bed, or the floor, as seen from above a corner: the picture of a page on
+        paper, where nothing turns."""
+        (x0, y0, z), (x1, y1, _) = self.low, self.high
+        floor = np.array(
+            [[[x0, y0, z], [x1, y0, z], [x1, y1, z]], [[x0, y0, z], [x1, y1, z], [x0, y1, z]]]
+        )
+        step = 1.2 * self.step
+        seen = look(surfaces_of(bodies), "corner", self.low, self.high, step)
+        below = look({0: self.bed if len(self.bed) else floor}, "corner", self.low, self.high, step)
+        seen.block[below.depth > seen.depth] = 0
+        picture = Image.alpha_composite(paint(below, {1: BED}, edges=False), paint(seen, colours))
+        image = tag("img", src=uri(picture), alt="the pile from above a corner")
+        return tag("figure", image, class_="sheet paper")
 
     def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
                 unit: Unit, level: float | None = None) -> Markup:  # fmt: skip

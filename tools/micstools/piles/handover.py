@@ -2,19 +2,22 @@
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from micstools import files
-from micstools.piles import pile_form
-from micstools.piles.layer import Maps, parted
+from micstools.piles import layer, pile_form
+from micstools.piles.layer import Layer, Maps, parted
+from micstools.piles.options import Options
 from micstools.reading import places
 from micstools.reading.overlap import Placed
-from micstools.reading.places import Landing, Place, Survey, row_of
+from micstools.reading.places import Landing, Place, Survey, Within, row_of
 from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import Units
 from micstools.shapes.geometry import Array
 
 
@@ -23,9 +26,50 @@ class Handover:
     """What is handed over of one run."""
 
     run: Run
-    survey: Survey
-    places: list[Place]
-    maps: Maps | None  # of the layer; none without units
+    told: Options
+
+    @property
+    def survey(self) -> Survey:
+        """Where the tank lies."""
+        return self.told.survey
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """Of all units."""
+        return places.places(self.run, self.survey)
+
+    @cached_property
+    def measured(self) -> tuple[Maps, Layer] | None:
+        """The layer and its maps; none without units."""
+        return layer.of_run(self.run, layers=self.told.layers, area=self.told.corners(self.run))
+
+    @property
+    def maps(self) -> Maps | None:
+        return self.measured[0] if self.measured else None
+
+    @property
+    def within(self) -> Within | None:
+        """How many units lie within the tolerance, as a rule half the nominal diameter; none
+        without a plan."""
+        if not (self.measured and places.has_plan(self.run)):
+            return None
+        usual = places.TOLERANCE * self.measured[1].nominal_diameter
+        return places.within(self.places, self.told.tolerance or usual)
+
+    def words(self, shown: Units) -> list[str]:
+        """Share within the tolerance, and the layer, in sentences."""
+        said = [places.share_words(self.within, shown.length)] if self.within else []
+        return said + (layer.words(self.measured[1], shown) if self.measured else [])
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """The same for files, in SI units."""
+        found: dict[str, Any] = {}
+        if self.measured:
+            found["layer"] = asdict(self.measured[1]) | {"definitions": layer.DEFINITIONS}
+        if self.within:
+            found["within"] = asdict(self.within) | {"share": self.within.share}
+        return found
 
     @property
     def outlines(self) -> list[tuple[str, Array]]:
@@ -143,8 +187,8 @@ def to_dxf(given: Handover, path: Path) -> Path:
             ends = (p.plan_x, p.plan_y, p.z), (p.x, p.y, p.z)
             space.add_line(*ends, dxfattribs={"layer": "DEVIATIONS"})
     for surface, line in given.outlines:
-        layer = f"OUTLINE_{surface.upper()}"
-        space.add_lwpolyline(line.tolist(), dxfattribs={"layer": layer})
+        name = f"OUTLINE_{surface.upper()}"
+        space.add_lwpolyline(line.tolist(), dxfattribs={"layer": name})
     drawing.saveas(path)
     return path
 
@@ -163,8 +207,8 @@ def landings_to_dxf(found: Iterable[Landing], contours: dict[float, list[Array]]
             text.dxf.height = 0.3 * one.long
     for probability, lines in contours.items():
         for line in lines:
-            layer = f"COVER_{100 * probability:.0f}"
-            space.add_lwpolyline(line.tolist(), dxfattribs={"layer": layer})
+            name = f"COVER_{100 * probability:.0f}"
+            space.add_lwpolyline(line.tolist(), dxfattribs={"layer": name})
     drawing.saveas(path)
     return path
 

@@ -16,6 +16,7 @@ from micstools.shapes.geometry import attitude_change_deg, below_plane
 
 TURN_LIMIT = 5.0  # [degrees]
 LEVEL_BAND = 0.01  # share of the rise
+PICTURES = 16  # of one view, where no times are asked for
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,8 @@ def _named(blocks: list[int]) -> list[int]:
 
 
 def telling_times(run: Run) -> list[float]:
-    """Times [s] worth a picture: the first block on its way down (figure 5), shortly before each
-    further drop (figure 6) and the end."""
+    """Times [s] worth a picture, at most PICTURES: the first block on its way down (figure 5),
+    shortly before each further drop (figure 6), of many drops evenly, and the end."""
     b = run.bodies
     released = np.sort(b.release_time[b.dropped])
     released = released[released <= b.time[-1]]
@@ -107,7 +108,8 @@ def telling_times(run: Run) -> list[float]:
     drawn = run.field_times if run.field_times.size else b.time
     before = [drawn[drawn < t - 1e-9].max(initial=drawn[0]) for t in released[1:]]
     first = released[0] + np.array([0.0, 0.1, 0.2, 0.3, 0.5])
-    wanted = np.concatenate([first, before, drawn[-1:]])
+    some = np.linspace(0, len(before), min(len(before), PICTURES - 6), endpoint=False).astype(int)
+    wanted = np.concatenate([first, np.array(before)[some], drawn[-1:]])
     nearest = [drawn[np.abs(drawn - t).argmin()] for t in wanted]
     return [float(t) for t in np.unique(nearest)]
 

@@ -15,7 +15,7 @@ from micstools.piles.layer import nominal_diameter, parted
 from micstools.piles.maps import ground_map, top_of, usual_step
 from micstools.piles.pile import has_papers_blocks, still_level
 from micstools.piles.pile_numbers import PileNumbers
-from micstools.piles.placing import Area, Placing, drop_area, placing
+from micstools.piles.placing import Area, Placing, drop_area, ends, placing
 from micstools.reading import block_numbers, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.places import TOLERANCE, Place, Survey, places
@@ -251,12 +251,14 @@ def remarkable(ensemble: Ensemble) -> dict[int, list[str]]:
 
 
 def spread_of(values: Sequence[float]) -> dict[str, float] | None:
-    """Median, 5 and 95 % of the known ones of some values; none where none is known."""
+    """Median with its 95 % interval, 5 and 95 % of the known ones of some values; none where none
+    is known."""
     known = [v for v in values if v == v]
     if not known:
         return None
     low, median, high = (float(v) for v in np.percentile(known, [5, 50, 95]))
-    return {"median": median, "5 %": low, "95 %": high, "known": len(known)}
+    interval = dict(zip(("median low", "median high"), median_interval(known), strict=True))
+    return {"median": median, "5 %": low, "95 %": high, "known": len(known)} | interval
 
 
 def median_interval(values: Sequence[float]) -> tuple[float, float]:
@@ -276,7 +278,15 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
 def rows(ensemble: Ensemble) -> list[dict[str, Any]]:
     """A row for each run with an outcome, its numbers included."""
     return [
-        p.row | {"pattern": p.pattern, "complete": p.complete} | flat(p.numbers)
+        p.row
+        | {"pattern": p.pattern, "complete": p.complete}
+        | {
+            "outside": ""
+            if (share := ensemble.area.share_outside(ends(p.run))) != share
+            else share,
+            "out_of_tank": int((p.run.bodies.status == 4).sum()),
+        }
+        | flat(p.numbers)
         for p in ensemble.piles
     ]
 

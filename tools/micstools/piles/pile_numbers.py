@@ -8,6 +8,7 @@ import numpy as np
 
 from micstools.piles import layer, pile_form
 from micstools.piles.maps import bed_volume, ground_map, height_map
+from micstools.piles.options import Options
 from micstools.reading import block_numbers, rest
 from micstools.reading.overlap import find_contacts, images, present_bodies, without_machines
 from micstools.reading.reader import BadRun, Run
@@ -27,6 +28,9 @@ class PileNumbers:
     centre: tuple[float, float, float]  # of mass [m]
     spread: tuple[float, float]  # standard deviation of the centroids in x and y [m]
     time_to_rest: float  # [s]; nan where the blocks still move
+    fall_time: float  # of the first block that is let go, until it touches something [s]
+    fall_speed: float  # its largest speed until then [m/s]
+    fall_drift: float  # its way until then, seen from above [m]
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
     contact_force: float  # largest on a dropped block, a mean over a step [N]
     peak_force: float  # the same within a step: an impact's impulse over contact_time [N]
@@ -46,7 +50,8 @@ class PileNumbers:
 
 KINDS = {
     "plan_area": "area", "top": "place", "centre": "place", "spread": "length",
-    "time_to_rest": "time", "impact_speed": "speed", "contact_force": "force",
+    "time_to_rest": "time", "fall_time": "time", "fall_speed": "speed", "fall_drift": "length",
+    "impact_speed": "speed", "contact_force": "force",
     "peak_force": "force", "slopes": "angle", "box": "place", "height": "length",
     "layer_thickness": "length", "footprint": "area", "thickness_ball": "length",
 }  # fmt: skip
@@ -71,10 +76,11 @@ def words(units: Units, name: str, values: Iterable[float]) -> str:
 
 
 def numbers(
-    run: Run, step: float, row: int = -1, box: tuple[Array, Array] | None = None
-) -> PileNumbers:
+    run: Run, step: float, row: int = -1, box: tuple[Array, Array] | None = None,
+    told: Options = Options(),  # noqa: B008 (it is frozen)
+) -> PileNumbers:  # fmt: skip
     """The numbers of a pile; its plan area is counted on squares of `step` [m], its porosity in a
-    `box`, by default that around the pile."""
+    `box`, by default that around the pile; layers and area of its layer as `told`."""
     b = run.bodies
     if not b.n:
         raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
@@ -96,7 +102,7 @@ def numbers(
         height = highest - float(run.grid.low[2])  # exact
     area = float(np.isfinite(top).sum() * step**2)
     volume = sum(body.shape.volume for body in bodies.values())
-    measured = layer.of_run(run, row)
+    measured = layer.of_run(run, row, told.layers, told.corners(run))
     found = measured[1] if measured else None
     ball = found.ball if found else layer.Surface(*[float("nan")] * 3)
     struck = block_numbers.of_blocks(run)
@@ -109,6 +115,9 @@ def numbers(
         centre=(x, y, z),
         spread=(float(place[:, 0].std()), float(place[:, 1].std())),
         time_to_rest=time_to_rest(run),
+        fall_time=struck[0].fall_time if struck else float("nan"),
+        fall_speed=struck[0].fastest if struck else float("nan"),
+        fall_drift=struck[0].drift if struck else float("nan"),
         impact_speed=impact_speed(run),
         contact_force=max((k.contact_force for k in struck), default=float("nan")),
         peak_force=max((k.peak_force for k in struck), default=float("nan")),

@@ -10,6 +10,9 @@ from micstools.reading.reader import Run
 from micstools.reading.units import Unit, Units
 from micstools.shapes.geometry import Array
 
+NUMBERS = ("centre_x", "centre_y", "spread_x", "spread_y", "half_within", "most_within", "outside")
+DRAWS = 1000  # of the bootstrap
+
 
 @dataclass(frozen=True)
 class Area:
@@ -38,6 +41,7 @@ class Placing:
     area: Area
     outside: float  # share of the centroids outside of the area
     outside_of_runs: tuple[float, float]  # 5 and 95 % of that share in single runs
+    interval_95: dict[str, tuple[float, float]]  # of each number, see `placing`
 
 
 def ends(run: Run) -> Array:
@@ -66,26 +70,39 @@ def drop_area(runs: Sequence[Run]) -> Area:
 
 
 def placing(runs: Sequence[Run], area: Area) -> Placing | None:
-    """Of all blocks of the runs; none without a block."""
+    """Of all blocks of the runs; none without a block. Intervals are those of the bootstrap over
+    runs, whose blocks are not independent of each other: B. Efron, R. J. Tibshirani (1993), An
+    introduction to the bootstrap, 13.3; nan of one run."""
     each = [places for run in runs if len(places := ends(run))]
     if not each:
         return None
-    places = np.concatenate(each)
-    centre, spread = places.mean(axis=0), places.std(axis=0)
-    away = np.linalg.norm(places - centre, axis=1)
-    half, most = np.percentile(away, [50, 90])
-    shares = [area.share_outside(one) for one in each]
-    low, high = np.percentile(shares, [5, 95])
-    return Placing(
-        blocks=len(places),
-        centre=(float(centre[0]), float(centre[1])),
-        spread=(float(spread[0]), float(spread[1])),
-        half_within=float(half),
-        most_within=float(most),
-        area=area,
-        outside=area.share_outside(places),
-        outside_of_runs=(float(low), float(high)),
+    found = _numbers(each, area)
+    draws = np.random.default_rng(1).integers(len(each), size=(DRAWS, len(each)))
+    drawn = [_numbers([each[k] for k in draw], area) for draw in draws] if len(each) > 1 else []
+    bounds = (
+        np.percentile(drawn, [2.5, 97.5], axis=0).T if drawn else np.full((len(found), 2), np.nan)
     )
+    low, high = np.percentile([area.share_outside(one) for one in each], [5, 95])
+    x, y, sx, sy, half, most, outside = (float(v) for v in found)
+    return Placing(
+        blocks=sum(map(len, each)),
+        centre=(x, y),
+        spread=(sx, sy),
+        half_within=half,
+        most_within=most,
+        area=area,
+        outside=outside,
+        outside_of_runs=(float(low), float(high)),
+        interval_95={k: (float(a), float(b)) for k, (a, b) in zip(NUMBERS, bounds, strict=True)},
+    )
+
+
+def _numbers(each: Sequence[Array], area: Area) -> Array:
+    """The NUMBERS of the places (n, 2) of some runs."""
+    places = np.concatenate(each)
+    centre = places.mean(axis=0)
+    within = np.percentile(np.linalg.norm(places - centre, axis=1), [50, 90])
+    return np.array([*centre, *places.std(axis=0), *within, area.share_outside(places)])
 
 
 def words(found: Placing, units: Units) -> str:
@@ -112,8 +129,10 @@ def _outside(found: Placing, place: Unit) -> str:
     low, high = (f"{100 * v:.0f}" for v in found.outside_of_runs)
     x, y = (_at("xy"[d], (area.low[d], area.high[d]), place) for d in (0, 1))
     which = "wanted area" if area.given else "area of the drops"
+    low_95, high_95 = (100 * v for v in found.interval_95["outside"])
+    sure = f"; 95 % interval {low_95:.0f} to {high_95:.0f} %" if low_95 == low_95 else ""
     return (
-        f" {100 * found.outside:.0f} % of them ({low} to {high} % in 90 % of the runs) lie "
+        f" {100 * found.outside:.0f} % of them ({low} to {high} % in 90 % of the runs{sure}) lie "
         f"outside the {which}, {x}, {y}\u00a0{place.name}."
     )
 

@@ -16,6 +16,9 @@ class BlockNumbers:
     block: int  # number, from 1
     released: float  # [s]
     at_rest: float  # after which it stays where it ends [s]
+    fall_time: float  # from its release to the first row in which it touches something [s]
+    fastest: float  # its largest speed until then [m/s]
+    drift: float  # its way until then, seen from above [m]
     impact_speed: float  # before its first touch, the largest over a quarter of its length [m/s]
     contact_force: float  # the largest, a mean over a step [N]
     peak_force: float  # the largest within a step: an impact's impulse over contact_time [N]
@@ -36,10 +39,16 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
     b = run.bodies
     start = int(np.searchsorted(b.time, b.release_time[k] - 1e-12))
     x, y, z = (float(v) for v in b.position[-1, k])
+    touched = np.flatnonzero(b.contacts[start:, k] > 0)
+    end = start + int(touched[0]) if touched.size else len(b.time) - 1
+    way = b.position[end, k, :2] - b.position[start, k, :2]
     return BlockNumbers(
         block=k + 1,
         released=float(b.release_time[k]),
         at_rest=rest.of_block(run, k).time,
+        fall_time=float(b.time[end] - b.release_time[k]) if touched.size else float("nan"),
+        fastest=_largest(b.velocity[start : end + 1, k]),
+        drift=float(np.linalg.norm(way)),
         impact_speed=float(b.impact_speed[k]),
         contact_force=_largest(b.contact_force_max[start:, k, None]),
         peak_force=_largest(b.contact_force_peak[start:, k, None]),
@@ -50,7 +59,7 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
     )
 
 
-def _largest(force: np.ndarray) -> float:
+def _largest(vectors: np.ndarray) -> float:
     """The largest of vectors (T, 3); nan where none is known."""
-    size = np.linalg.norm(force, axis=1)
+    size = np.linalg.norm(vectors, axis=1)
     return float(np.nanmax(size)) if np.isfinite(size).any() else float("nan")

@@ -7,7 +7,7 @@ these do. All lengths in metres.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -255,6 +255,7 @@ class Contacts:
         return body in self.bed or (body, "z_min") in self.walls
 
 
+@lru_cache(maxsize=2)
 def find_contacts(run: Run, row: int) -> Contacts:
     """What is within the reach of `scales` of each other: pairs of released blocks, and they and
     walls or the bed."""

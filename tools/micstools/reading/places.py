@@ -102,6 +102,12 @@ def heading_and_tilt(quaternion: Array, north: float = 0.0) -> tuple[float, floa
     return (0.0 if heading == 360.0 else heading), math.degrees(tilt)
 
 
+def has_plan(run: Run) -> bool:
+    """Are units meant to lie where they are let go: have they names, or does a crane lower them?"""
+    drops = run.parameters.get("drop", [])
+    return any(run.bodies.name) or any(drop.get("lowering_speed", 0) > 0 for drop in drops)
+
+
 def planned(run: Run) -> Array:
     """Place (N, 3) of each body in the plan [m]: where it is let go, without the random shift that
     `spread` gives it. The last row before its release shows the level, and all of it in results of

@@ -12,7 +12,7 @@ from micstools.cases import settings
 from micstools.ensembles import ensemble
 from micstools.ensembles.ensemble import Member
 from micstools.pages import ensemble_page, motion, run_page, run_words
-from micstools.piles import pile_ensemble
+from micstools.piles import options, pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
 from micstools.serve.server import Site, apart, foreign_answer, json_answer, order_of, page_answer
@@ -204,9 +204,9 @@ class Watch:
     def _write_report(self) -> None:
         folder = self.watched.folder
         if isinstance(self.watched, Ensemble):
-            text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
+            text = ensemble_page.page(pile_ensemble.open_ensemble(folder), options.told(folder))
         else:
-            text = run_page.page(command.open_run(folder))
+            text = run_page.page(command.open_run(folder), options.told(folder))
         files.write(self.report, text)
 
     async def _report(self, _: web.Request) -> web.Response:
