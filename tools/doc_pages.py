@@ -18,6 +18,8 @@ WRITTEN = {
     "build/bench.json",
     "ensemble.csv",
     "ensemble.json",
+    "handover.json",
+    "mics-roundhead/handover.json",
     "mics-paper-ensemble/shares.md",
     "landings.csv",
     "pile.csv",

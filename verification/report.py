@@ -29,6 +29,8 @@ CASES = Path(__file__).resolve().parent / "cases"
 OURS = ("#0b5394", "#c55a11", "#38761d", "#741b47", "#7f6000", "#134f5c")
 THEIRS = ("#222222", "#888888", "#aa6666", "#66aa66")
 OPTIONS = ("numerics", "contact")
+FOLLOWS = ("solver", "courant_max")
+"""Options whose default follows the model of contact."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,9 @@ def differences(run: Run, plain: Run) -> list[str]:
     found = []
     for group in OPTIONS:
         own, usual = (r.parameters.get(group, [{}])[0] for r in (run, plain))
-        found += [f"{group} {key} = {own[key]!r}" for key in own if own[key] != usual.get(key)]
+        follows = FOLLOWS if own.get("model") == "spheres" else ()
+        found += [f"{group} {key} = {own[key]!r}" for key in own
+                  if own[key] != usual.get(key) and key not in follows]  # fmt: skip
     return found
 
 

@@ -1,12 +1,12 @@
-!> The sling of a crane that sets a block down: shortly above what lies below it slows down, and
-!! lowers the block until it is slack. It holds it as it hung the less the less it carries, so that
-!! the block comes to lie on what is below, and catches it where it slips.
+!> The sling of a crane that sets a block down: close above what lies below, the crane slows down,
+!! and lowers the block until the sling is slack. The less the sling carries, the less it holds the
+!! block as it hung; so the block comes to lie on what is below, and is caught where it slips.
 !!
-!! It is a spring with a dashpot, from the block up to an end that goes down at a share of the speed
-!! of lowering while it carries something; s is how much longer it is than at rest. It gives way by a share e of the smallest edge
-!! d under the weight W. Its force T acts at the radius a of the block above the centre, along the
-!! body axis u that pointed up (z) when it began to hang. Forces and torques are those of the end of
-!! the step, so that any step is stable:
+!! It is a spring with a dashpot, from the block up to an end that goes down slowly while the sling
+!! carries something; s is how much longer it is than at rest. It gives way by a share e of the
+!! smallest edge d under the weight W. Its force T acts at the radius a of the block above the
+!! centre, along the body axis u that pointed up (z) when the block began to hang. Force and torque
+!! are those of the end of the step, so that any step is stable:
 !!
 !! $$ T = k s + c \dot s \ge 0, \quad k = W/(e d), \quad c = 2 \sqrt{k M}, $$
 !! $$ M_T = K u \times z - C \omega, \quad K = T a, \quad C = 2 \sqrt{K I} . $$

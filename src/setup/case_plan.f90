@@ -27,7 +27,7 @@ module case_plan_m
   use surface_search_m, only: surface_t
   implicit none
   private
-  public :: print_plan, place_text
+  public :: print_plan
 
   integer, parameter :: label_width = 24      !! columns of the names
   real(wp), parameter :: speed = 1.0_wp       !! at which time-step limits are quoted [m/s]

@@ -5,9 +5,8 @@ module case_warnings_m
   use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use case_blocks_m, only: turning_share
-  use case_plan_m, only: place_text
   use bed_m, only: bed_t, facet_within, max_clip_corners
-  use value_text_m, only: quoted_text
+  use value_text_m, only: quoted_text, fixed_text
   use tet_mesh_m, only: shape_t, extreme_of_family, extent_along
   use vectors_m, only: rotation_matrix
   use polygon_m, only: area_vector
@@ -73,7 +72,7 @@ contains
     integer, parameter :: most = 1000            !! squares along a side
     real(wp), allocatable :: up(:, :, :)         ! (3, x, y) area of the facets of a square [m2]
     real(wp) :: p(3, max_clip_corners), area(3), middle(2), size_of(2), share
-    integer :: n(2), at(2), f, m
+    integer :: n(2), at(2), f, m, digits
 
     associate (low => case%grid%origin, length => case%grid%length, mu => case%contact%bed_friction)
       n = max(1, min(most, ceiling(0.5_wp*length(:2)/minval(shapes%radius))))
@@ -91,12 +90,14 @@ contains
         if (.not. share > 0.0_wp) return
         at = maxloc(slope)
         middle = low(:2) + (at - 0.5_wp)*size_of
+        digits = max(1, 1 - floor(log10(minval(size_of))))
         call warnings%add_message('&bed file = '//quoted_text(case%bed%file)//': '// &
           brief(100.0_wp*share, 2)//' % of it is steeper than the ' &
           //brief(atan(mu)*180.0_wp/pi, 3)//' degrees that friction = '//to_text(mu) &
-          //' holds, near x, y = '//place_text(middle(1), length) &
-          //', '//place_text(middle(2), length)//' m '//brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3) &
-          //' degrees: blocks slide there', case%bed%line)
+          //' holds, near x, y = '//fixed_text(middle(1), digits) &
+          //', '//fixed_text(middle(2), digits)//' m ' &
+          //brief(atan(slope(at(1), at(2)))*180.0_wp/pi, 3)//' degrees: blocks slide there', &
+          case%bed%line)
       end associate
     end associate
   end subroutine look_at_slope

@@ -223,6 +223,9 @@ def test_numbers_of_each_block(make_run) -> None:
     (found,) = block_numbers.of_blocks(run)
     speed = np.linalg.norm(run.bodies.velocity[:, 3], axis=1)
     assert (found.block, found.released) == (4, 0.0)
+    assert found.fall_time == pytest.approx(0.4, abs=0.05) and found.fastest == speed.max()
+    way = run.bodies.position[:, 3, :2] - run.bodies.position[0, 3, :2]
+    assert found.drift == pytest.approx(np.linalg.norm(way[run.bodies.contacts[:, 3] > 0][0]))
     assert found.at_rest == pytest.approx(0.8, abs=0.05)
     assert found.impact_speed == pytest.approx(speed.max())
     force = np.linalg.norm(run.bodies.contact_force[:, 3], axis=1).max()
@@ -277,7 +280,7 @@ def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
 @pytest.mark.parametrize("width", [360, 700, 1100])
 def test_no_text_leaves_its_tile(browser: Browser, report: Path, width: int) -> None:
     browser.open(report, width)
-    assert browser.run("document.querySelectorAll('.facts div').length") == 8
+    assert browser.run("document.querySelectorAll('.facts div').length") == 9
     assert browser.out_of(".facts div") == []
 
 

@@ -15,7 +15,7 @@ import pytest
 from browser import Browser
 from calls import mics_tools
 from micstools.pages import charts, ensemble_page
-from micstools.piles import pile_ensemble, pile_numbers
+from micstools.piles import pile_ensemble, pile_numbers, placing
 from micstools.reading import shares
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
@@ -116,7 +116,7 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys) -> None:
     said = capsys.readouterr().out
     assert "5 blocks lie around x = " not in said and "6 blocks lie around x = " in said
     assert "A 1 of 6" not in said  # these are no blocks of the paper
-    assert " mm (" in said and " cm2 (" in said
+    assert " mm [" in said and " cm2 [" in said
     content = json.loads((folder / "pile.json").read_text())
     assert content["complete"] == 5 and content["left_out"] == {"7": "failed"}
     assert content["convergence"]["A"][3][:2] == [4, 0.25]
@@ -154,13 +154,30 @@ def test_where_blocks_lie(ensemble: pile_ensemble.Ensemble, tmp_path: Path, caps
     words = ["pile", str(ensemble.folder), "--step", "0.002", "--area", "0.2", "0", "0.3", "0.1"]
     assert mics_tools(words) == 0
     said = capsys.readouterr().out
-    assert "17 % of them (0 to 75 % in 90 % of the runs) lie outside the wanted area" in said
+    assert "17 % of them (0 to 75 % in 90 % of the runs; 95 % interval 0 to 50 %) lie" in said
     assert "x = 200 to 300, y = 0 to 100 mm" in said
     placing = json.loads((ensemble.folder / "pile.json").read_text())["placing"]
     assert placing["outside"] == pytest.approx(1 / 6)
     assert placing["area"]["high"] == [0.3, 0.1]
     assert mics_tools(["pile", str(ensemble.folder), "--area", "0.3", "0", "0.2", "0.1"]) == 2
     assert "first corner must be the lower" in capsys.readouterr().err
+
+
+def test_intervals_are_those_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the mean of 400 independent runs as of the normal distribution; the three blocks of a run
+    that lie together count once."""
+    monkeypatch.setattr(placing, "ends", lambda run: run)
+    x = np.random.default_rng(5).normal(size=(400, 2))
+    area = placing.Area((0.0, -9.0), (9.0, 9.0), True)
+    for times in (1, 3):
+        found = placing.placing([np.repeat(one[None], times, axis=0) for one in x], area)
+        low, high = found.interval_95["centre_x"]
+        assert (low + high) / 2 == pytest.approx(x[:, 0].mean(), abs=0.01)
+        assert high - low == pytest.approx(2 * 1.96 * x[:, 0].std() / 20, rel=0.06)
+        share = found.outside
+        low, high = found.interval_95["outside"]
+        assert high - low == pytest.approx(2 * 1.96 * np.sqrt(share * (1 - share)) / 20, rel=0.06)
+    assert np.isnan(placing.placing([x], area).interval_95["centre_x"]).all()
 
 
 def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:

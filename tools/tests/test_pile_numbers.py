@@ -115,8 +115,9 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     assert mics_tools(["pile", str(run.folder)]) == 0
     content = json.loads((run.folder / "pile.json").read_text())
     assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
-        "time_to_rest": "s", "impact_speed": "m/s", "contact_force": "N", "peak_force": "N",
-        "slopes": "deg", "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
+        "time_to_rest": "s", "fall_time": "s", "fall_speed": "m/s", "fall_drift": "m",
+        "impact_speed": "m/s", "contact_force": "N", "peak_force": "N", "slopes": "deg",
+        "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
         "footprint": "m2"}  # fmt: skip
     corners = np.concatenate(content["outline"])
     assert len(content["outline"]) == 4

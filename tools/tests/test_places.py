@@ -235,9 +235,9 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
 
 
 @pytest.mark.parametrize("to", ["csv", "geojson", "dxf", "asc"])
-def test_the_system_of_a_survey_is_asked_for(run: Run, to: str, tmp_path: Path, capsys) -> None:
+def test_the_system_of_a_survey_is_asked_for(to: str, tmp_path: Path, capsys) -> None:
     """Not of a tank, and not if it is given."""
-    words = ["places", str(run.folder), "--to", to, "--out", str(tmp_path)]
+    words = ["places", str(write(tmp_path / "run").folder), "--to", to, "--out", str(tmp_path)]
     far = ["--origin", "354200,5621080,-12.5"]
     for more, asked in (([], False), (far, True), ([*far, "--crs", "epsg:25832"], False)):
         assert mics_tools([*words, *more]) == 0

@@ -24,8 +24,10 @@ VIEWS = {
     "front": (np.array([1, 0, 0]), np.array([0, 0, 1]), np.array([0, -1, 0])),
     "side": (np.array([0, 1, 0]), np.array([0, 0, 1]), np.array([1, 0, 0])),
     "top": (np.array([1, 0, 0]), np.array([0, 1, 0]), np.array([0, 0, 1])),
-    "corner": (np.array([0.8, -0.6, 0]), np.array([0.3, 0.4, 0.75**0.5]),
-               np.array([-0.75**0.5 * 0.6, -0.75**0.5 * 0.8, 0.5])),
+    "left": (np.array([0.8, -0.6, 0]), np.array([0.3, 0.4, 0.75**0.5]),
+             np.array([-0.75**0.5 * 0.6, -0.75**0.5 * 0.8, 0.5])),
+    "right": (np.array([0.8, 0.6, 0]), np.array([-0.3, 0.4, 0.75**0.5]),
+              np.array([0.75**0.5 * 0.6, -0.75**0.5 * 0.8, 0.5])),
 }  # fmt: skip
 NAMES = {"front": ("x", "z"), "side": ("y", "z"), "top": ("x", "y")}
 _LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
@@ -166,18 +168,20 @@ class Sheet:
         return picture, seen
 
     def corner(self, bodies: dict[int, Placed], colours: dict[int, str]) -> Markup:
-        """Blocks and bed, or the floor, as seen from above a corner: the picture of a page on
-        paper, where nothing turns."""
+        """Blocks and bed, or the floor, from above the front corner that the bed falls to: the
+        picture of a page on paper, where nothing turns."""
         (x0, y0, z), (x1, y1, _) = self.low, self.high
-        floor = np.array(
-            [[[x0, y0, z], [x1, y0, z], [x1, y1, z]], [[x0, y0, z], [x1, y1, z], [x0, y1, z]]]
-        )
-        step = 1.2 * self.step
-        seen = look(surfaces_of(bodies), "corner", self.low, self.high, step)
-        below = look({0: self.bed if len(self.bed) else floor}, "corner", self.low, self.high, step)
+        floor = np.array([[[x0, y0, z], [x1, y0, z], [x1, y1, z]],
+                          [[x0, y0, z], [x1, y1, z], [x0, y1, z]]])  # fmt: skip
+        ground = self.bed if len(self.bed) else floor
+        middle, step = ground.mean(axis=1), 1.2 * self.step
+        falls = ((middle[:, 0] - middle[:, 0].mean()) * (middle[:, 2] - z)).sum() < 0
+        view = "right" if falls else "left"
+        seen = look(surfaces_of(bodies), view, self.low, self.high, step)
+        below = look({0: ground}, view, self.low, self.high, step)
         seen.block[below.depth > seen.depth] = 0
         picture = Image.alpha_composite(paint(below, {1: BED}, edges=False), paint(seen, colours))
-        image = tag("img", src=uri(picture), alt="the pile from above a corner")
+        image = tag("img", src=uri(picture.crop(picture.getbbox())), alt="the pile from a corner")
         return tag("figure", image, class_="sheet paper")
 
     def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
