@@ -3,7 +3,7 @@
 // flat views rulers and a length that was measured.
 
 const AXES = [['x', '#d1495b'], ['y', '#3f9b5b'], ['z', '#4a8fd9']];
-const LEAST = 5; // squares of the map of blocks that a number needs
+const LEAST = 12; // squares of the map of blocks that a number needs
 const MOST = 20000; // points of all paths
 const LONG = 46, HIGH = 13; // room of a label [pixels]
 const FONT = '12px system-ui, "Liberation Sans", sans-serif';

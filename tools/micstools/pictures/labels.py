@@ -88,7 +88,7 @@ def number_blocks(picture: Image.Image, ids: Ids) -> None:
     draw, font = ImageDraw.Draw(picture), _font(size)
     for number in np.unique(ids[ids > 0]):
         y, x = np.nonzero(ids == number)
-        if len(x) < 0.4 * size * font.getlength(str(number)):
+        if len(x) < 1.5 * size * font.getlength(str(number)):
             continue
         nearest = int(((x - x.mean()) ** 2 + (y - y.mean()) ** 2).argmin())
         place = (int(x[nearest]), int(y[nearest]))
