@@ -134,6 +134,27 @@ contains
     self%number(c(1), c(2), c(3)) = self%n
   end subroutine add_cell
 
+  !> The same for a cell beyond the first n_known of the list, which several bodies may name: it is
+  !! at the wall of the one with the largest share, whatever their order.
+  subroutine add_cell_of_most(c, body, share, n_known, most, self)
+    integer, intent(in) :: c(3), body, n_known
+    real(wp), intent(in) :: share                          !! [-]
+    real(wp), intent(inout), allocatable :: most(:)        !! (*) largest so far [-]
+    type(merged_cells_t), intent(inout) :: self
+    integer :: n
+
+    n = self%number(c(1), c(2), c(3))
+    if (n == 0) then
+      call add_cell(c, body, self)
+      n = self%n
+      call ensure_capacity(n, most)
+      most(n) = share
+    else if (n > n_known) then
+      if (share > most(n)) self%body(n) = body
+      most(n) = max(most(n), share)
+    end if
+  end subroutine add_cell_of_most
+
   !> The cut cells with their centre in the fluid, each at the wall of the body that fills most of
   !! it, and the cells at faces that a body fills, or in which it holds fluid, in part.
   subroutine add_cut_cells(grid, solid, self)
@@ -141,41 +162,35 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
     real(wp), allocatable :: most(:)
-    integer :: b, m, n, c(3)
+    integer :: b, m, n_cut, c(3)
 
     allocate (most(0))
     do b = 1, size(solid%body_cell) - 1
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         c = solid%cell(:, m)
         if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, halo_layers)) cycle
-        n = self%number(c(1), c(2), c(3))
-        if (n == 0) then
-          call add_cell(c, b, self)
-          n = self%n
-          call ensure_capacity(n, most)
-          most(n) = 0.0_wp
-        end if
-        if (solid%cell_alpha(m) <= most(n)) cycle
-        most(n) = solid%cell_alpha(m)
-        self%body(n) = b
+        call add_cell_of_most(c, b, solid%cell_alpha(m), self%n_small, most, self)
       end do
     end do
+    n_cut = self%n
     do b = 1, size(solid%body_face) - 1
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        call add_beside(solid%face(1:3, m))
-        call add_beside(solid%face(1:3, m) - unit_step(:, solid%face(4, m)))
+        call add_beside(solid%face(1:3, m), solid%face_beta(m))
+        call add_beside(solid%face(1:3, m) - unit_step(:, solid%face(4, m)), solid%face_beta(m))
       end do
       do m = solid%first_held(b), solid%first_held(b + 1) - 1
-        call add_beside(solid%held_face(1:3, m))
-        call add_beside(solid%held_face(1:3, m) - unit_step(:, solid%held_face(4, m)))
+        call add_beside(solid%held_face(1:3, m), solid%held_share(m))
+        call add_beside(solid%held_face(1:3, m) - unit_step(:, solid%held_face(4, m)), solid%held_share(m))
       end do
     end do
   contains
-    subroutine add_beside(c)
+    subroutine add_beside(c, share)
       integer, intent(in) :: c(3)
+      real(wp), intent(in) :: share   !! of the face that the body fills
 
       if (.not. is_near(grid, c, halo_layers)) return
-      if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell(c, b, self)
+      if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell_of_most(c, b, share, n_cut, &
+        most, self)
     end subroutine add_beside
   end subroutine add_cut_cells
 
@@ -212,7 +227,8 @@ contains
     type(merged_cells_t), intent(inout) :: self
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the small cell [m]
-    integer :: m, n, o(3), body
+    integer :: m, n, n_known, o(3), body
+    real(wp), allocatable :: most(:)
     integer :: step(3, max_targets, self%n_small)   ! from the small cells to their targets
 
     call ensure_capacity(self%n_small, self%normal)
@@ -241,13 +257,15 @@ contains
         self%r(:, m) = r
       end associate
     end do
+    n_known = self%n
+    allocate (most(0))
     do m = 1, self%n_small
-      body = self%body(m)
+      body = self%body(m)   ! the list may move as it grows
       self%target(:, m) = 0
       do n = 1, max_targets
         o = self%cell(:, m) + step(:, n, m)
         if (self%share(n, m) <= 0.0_wp .or. .not. is_near(grid, o, n_halo)) cycle
-        call add_cell(o, body, self)
+        call add_cell_of_most(o, body, self%share(n, m), n_known, most, self)
         self%target(n, m) = self%number(o(1), o(2), o(3))
       end do
     end do
