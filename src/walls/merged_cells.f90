@@ -180,7 +180,8 @@ contains
       end do
       do m = solid%first_held(b), solid%first_held(b + 1) - 1
         call add_beside(solid%held_face(1:3, m), solid%held_share(m))
-        call add_beside(solid%held_face(1:3, m) - unit_step(:, solid%held_face(4, m)), solid%held_share(m))
+        call add_beside(solid%held_face(1:3, m) - unit_step(:, solid%held_face(4, m)), &
+          solid%held_share(m))
       end do
     end do
   contains
