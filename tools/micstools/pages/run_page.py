@@ -229,7 +229,7 @@ def _drawings(given: Handover) -> list[Markup]:
 
 def _farther_off(given: Handover, within: Within, shown: Units) -> list[Markup]:
     """The units out of tolerance, the farthest first."""
-    off = [p for p in given.places if not p.fixed and not p.deviation <= within.tolerance]
+    off = [p for p in places.placed(given.places) if not places.is_within(p, within.tolerance)]
     off.sort(key=lambda p: -p.deviation)
     if not off:
         return []

@@ -19,7 +19,7 @@ from micstools.piles import pile
 from micstools.piles.handover import Handover
 from micstools.piles.layer import Layer, Maps
 from micstools.reading.overlap import Placed
-from micstools.reading.places import Place
+from micstools.reading.places import Place, is_within
 from micstools.reading.reader import BadRun
 from micstools.shapes.geometry import Array
 from micstools.shapes.height_maps import SURVEY
@@ -135,7 +135,7 @@ def _colour(given: Handover, p: Place) -> str:
         return _HELD
     if not given.within:
         return _PLAIN
-    return _GOOD if p.deviation <= given.within.tolerance else _BAD
+    return _GOOD if is_within(p, given.within.tolerance) else _BAD
 
 
 def _plain(axes: Axes) -> None:

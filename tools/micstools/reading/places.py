@@ -192,10 +192,20 @@ class Within:
         return self.count / self.units if self.units else math.nan
 
 
+def placed(found: Sequence[Place]) -> list[Place]:
+    """The free units that were released."""
+    return [p for p in found if not p.fixed and p.deviation == p.deviation]
+
+
+def is_within(p: Place, tolerance: float) -> bool:
+    """Is a unit at its place? One out of the tank is not."""
+    return p.deviation <= tolerance and p.exit_time != p.exit_time
+
+
 def within(found: Sequence[Place], tolerance: float) -> Within:
-    """Of all free units that were released; one out of the tank is not at its place."""
-    units = [p for p in found if not p.fixed and p.deviation == p.deviation]
-    count = sum(p.deviation <= tolerance and p.exit_time != p.exit_time for p in units)
+    """Of all free units that were released."""
+    units = placed(found)
+    count = sum(is_within(p, tolerance) for p in units)
     return Within(tolerance, len(units), count, wilson(count, len(units)))
 
 
