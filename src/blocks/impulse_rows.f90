@@ -74,7 +74,8 @@ module impulse_rows_m
     real(wp), allocatable :: by_contact(:, :)     !! (6, counterparts) change of v in a sub-sweep
     !> Work where masses differ much: impulses and velocities before a sweep, directions.
     logical :: hard = .false.
-    real(wp) :: h = 0.0_wp, push_max = 0.0_wp     !! sub-sweep, largest speed of opening [s], [m/s]
+    real(wp) :: h = 0.0_wp                        !! sub-sweep [s]
+    real(wp) :: push_max = 0.0_wp, fall = 0.0_wp  !! of opening, by gravity in a sub-sweep [m/s]
     logical :: impact = .false.                   !! sweeps are over the impulses of a whole step
     integer :: number = 0                         !! of the sweep, 0: over all pairs
     real(wp) :: small = 0.0_wp                    !! change of a velocity that ends them [m/s]

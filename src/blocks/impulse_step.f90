@@ -31,7 +31,6 @@ module impulse_step_m
   real(wp), parameter :: free_way = 0.5_wp
     !! covered by the list of pairs, over a bounding radius [-]
   real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
-  real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
   type, extends(contact_solver_t) :: impulses_t
     type(contact_surface_t) :: surface
@@ -225,8 +224,8 @@ contains
           end associate
         end do
         asked = n
-        call solve_rows(h, max_opening*contacts%smallest_edge/contacts%rows%contact_time, &
-          contacts%restitution, slow_hit*norm(gravity)*step, n, rows)
+        call solve_rows(h, norm(gravity), max_opening*contacts%smallest_edge/rows%contact_time, &
+          contacts%restitution, n, rows)
         if (n < asked) step = h*real(n, wp)   ! else rounding would leave a step of no length
       end if
       call sum_loads(step, rows, loads%force, loads%torque, contacts%spread)

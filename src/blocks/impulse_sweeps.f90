@@ -32,15 +32,16 @@ module impulse_sweeps_m
 
   integer, parameter :: n_correct = 2           !! sweeps with bias; one lets the stack creep
   integer, parameter :: n_busy = 16             !! where bodies change much, at most
-  real(wp), parameter :: busy = 10.0_wp         !! change of a sweep that asks for another [m/s2]
+  real(wp), parameter :: busy = 1.0_wp          !! change of a sweep that asks for another [g]
   integer, parameter :: n_finish = 160          !! sweeps over an impact, at most
   integer, parameter :: n_open = 6              !! sweeps after what it returned
   integer, parameter :: n_hard = 400            !! sweeps where masses differ much, at most
   real(wp), parameter :: max_turn = 0.02_wp     !! by contact in the rest of a step, times e [rad]
   integer, parameter :: never = -2              !! no sweep changed it
   integer, parameter :: worth_threads = 512     !! fewer rows are the work of one thread
-  real(wp), parameter :: settled = 1.0e-5_wp    !! change of a sweep that no longer counts [m/s2]
+  real(wp), parameter :: settled = 1.0e-6_wp    !! change of a sweep that no longer counts [g]
   real(wp), parameter :: balance = 10.0_wp      !! acceleration left, over that, that counts [-]
+  real(wp), parameter :: slow_hit = 2.0_wp      !! speed below which no impact bounces, over g dt
   real(wp), parameter :: small = 0.03_wp        !! change that ends an impact, over slow hits [-]
   real(wp), parameter :: fast_share = 2.0e-3_wp !! the same, over the fastest hit [-]
   real(wp), parameter :: residual = 1.0e-7_wp   !! where masses differ much, over the first change
@@ -49,13 +50,11 @@ contains
 
   !> Impulses, velocities and ways of a contact step of n sub-sweeps, or of fewer: the step ends
   !! where contact has changed a spin so much that the bodies would turn far in the rest of it.
-  !!
   !! Where nothing changes any more, and all is in balance, the rest of the step goes on as it is.
-  subroutine solve_rows(h, push_max, e, slowest, n, rows)
-    real(wp), intent(in) :: h          !! sub-sweep [s]
+  subroutine solve_rows(h, g, push_max, e, n, rows)
+    real(wp), intent(in) :: h, g       !! sub-sweep [s], gravity [m/s2]
     real(wp), intent(in) :: push_max   !! largest speed with which overlaps open [m/s]
     real(wp), intent(in) :: e          !! restitution [-]
-    real(wp), intent(in) :: slowest    !! closing speed of what counts as a hit [m/s]
     integer, intent(inout) :: n        !! sub-sweeps
     type(rows_t), intent(inout) :: rows
     logical :: backward
@@ -63,8 +62,9 @@ contains
     integer :: s, k, left, r
 
     rows%h = h
+    rows%fall = g*h
     rows%push_max = push_max
-    rows%small = busy*h
+    rows%small = busy*rows%fall
     rows%impact = .false.
     call apply_remembered(rows)
     do s = 1, n
@@ -83,7 +83,7 @@ contains
         end associate
       end do
       left = 1
-      if (change < settled*h .and. s < n) then
+      if (change < settled*rows%fall .and. s < n) then
         if (balanced(h, rows)) left = n - s + 1
       end if
       ! Count the impulses of a sub-sweep, so many times.
@@ -97,7 +97,7 @@ contains
       if (e*spin*h*real(n - s, wp) > max_turn) n = s
       if (s >= n) exit
     end do
-    call end_impacts(n, e, slowest, backward, rows)
+    call end_impacts(n, e, backward, rows)
   end subroutine solve_rows
 
   !> Change of the velocities by the impulses remembered.
@@ -234,7 +234,7 @@ contains
       change = max(change, last)
       if (i == n) first = last
       if (rows%hard .and. .not. rows%impact) then
-        if (i >= n .and. last <= max(residual*first, settled*rows%h)) exit
+        if (i >= n .and. last <= max(residual*first, settled*rows%fall)) exit
       else if (rows%impact .or. i >= n) then
         if (last < rows%small) exit
         rows%number = rows%number + 1
@@ -400,7 +400,7 @@ contains
       associate (b => rows%active(k))
         if (rows%inverse_mass(b) <= 0.0_wp) cycle
         if (maxval(abs(h*rows%a_free(1:3, b) + rows%by_contact(1:3, b))) &
-            > balance*settled*h) return
+            > balance*settled*rows%fall) return
       end associate
     end do
     yes = .true.
@@ -484,14 +484,15 @@ contains
 
   !> End the impacts of a step of n sub-sweeps in it: nothing closes any more, then the rows reached
   !! give back what they are to, then nothing closes again. None of it is remembered.
-  subroutine end_impacts(n, e, slowest, backward, rows)
+  subroutine end_impacts(n, e, backward, rows)
     integer, intent(in) :: n
-    real(wp), intent(in) :: e, slowest   !! restitution [-], closing speed of a hit [m/s]
+    real(wp), intent(in) :: e            !! restitution [-]
     logical, intent(inout) :: backward   !! whether the next sweep is
     type(rows_t), intent(inout) :: rows
-    real(wp) :: speed
+    real(wp) :: slowest, speed   ! closing speed of a hit, of the fastest [m/s]
     integer :: i, k, r
 
+    slowest = slow_hit*rows%fall*real(n, wp)
     call mark_hits(slowest, rows, speed)
     if (.not. speed > 0.0_wp) return
     rows%small = max(small*slowest, fast_share*speed)

@@ -20,7 +20,7 @@ module motion_file_m
   character(*), parameter :: units(8) = [character(3) :: 's', 'm', 'm', 'm', '', '', '', '']
   integer, parameter :: n_required = 4
   real(wp), parameter :: largest_turn = 170.0_wp   !! from row to row [degrees]
-  real(wp), parameter :: same_place = 1.0e-6_wp    !! of `position` and the table [m]
+  real(wp), parameter :: same_place = 1.0e-6_wp    !! of `position` and the table, over the tank [-]
 
 contains
 
@@ -57,7 +57,7 @@ contains
         call given_motion_init(time, x, q, body%path)
         call pose_at(body%path, max(body%release_time, 0.0_wp), place, attitude, v, omega)
         if (is_given(body%position(1))) then
-          if (norm(body%position - place) > same_place) then
+          if (norm(body%position - place) > same_place*maxval(case%grid%length)) then
             call problems%add_message('&body position = '//to_text(body%position) &
               //': motion = '//quoted_text(body%motion)//' has the body at '//to_text(place) &
               //' then; leave position away, or give that', body%line)

@@ -17,6 +17,7 @@ module release_m
   use vectors_m, only: norm
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
+  use moments_m, only: has_come
   use grid_m, only: grid_t
   use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, &
     left_out, out
@@ -28,8 +29,6 @@ module release_m
   private
   public :: release_due_blocks, let_go_lowered, next_release, n_pending, nothing_to_come
   public :: take_out
-
-  real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
 
 contains
 
@@ -183,7 +182,7 @@ contains
     logical :: due(blocks%n)
 
     due = .not. blocks%present .and. blocks%status == to_come &
-          .and. .not. blocks%release_time > time + same_time
+          .and. has_come(blocks%release_time, time)
   end function is_due
 
   !> Put due blocks into the order in which they are tried: as they are numbered, but of those that
@@ -223,7 +222,8 @@ contains
       integer, intent(in) :: a, b
       logical :: yes
 
-      yes = abs(blocks%release_time(a) - blocks%release_time(b)) <= same_time
+      yes = has_come(blocks%release_time(a), blocks%release_time(b)) &
+        .and. has_come(blocks%release_time(b), blocks%release_time(a))
     end function same_moment
   end subroutine order_due
 
@@ -271,7 +271,7 @@ contains
     next = huge(next)
     if (blocks%n == 0) return
     next = minval(blocks%release_time, mask=blocks%status == to_come .and. .not. blocks%present &
-                  .and. blocks%release_time > time + same_time)
+                  .and. .not. has_come(blocks%release_time, time))
   end function next_release
 
   !> Number of blocks whose time came before this moment but whose place was taken; one that is due
@@ -283,7 +283,7 @@ contains
 
     n = 0
     if (blocks%n > 0) n = count(blocks%status == to_come .and. .not. blocks%present &
-                                .and. blocks%release_time < time - same_time)
+                                .and. .not. has_come(time, blocks%release_time))
   end function n_pending
 
   !> Does nothing but the free blocks move from now on? Every block is let go, left out, or tried

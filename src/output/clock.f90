@@ -5,12 +5,11 @@
 !! end.
 module clock_m
   use kinds_m, only: wp
+  use moments_m, only: has_come
   use case_types_m, only: run_t
   implicit none
   private
   public :: clock_t, clock_init
-
-  real(wp), parameter :: same_time = 1.0e-12_wp   !! times closer than this are one [s]
 
   !> What is due at the multiples of an interval.
   type :: schedule_t
@@ -54,7 +53,7 @@ contains
     real(wp), intent(in) :: t   !! [s]
     logical :: yes
 
-    yes = t >= self%next - same_time
+    yes = has_come(self%next, t)
   end function due
 
   !> What was due has been done.
@@ -82,9 +81,9 @@ contains
     real(wp) :: n   ! a whole number, perhaps beyond integers
 
     next = t
-    if (interval <= max(same_time, epsilon(t)*t)) return
+    if (has_come(t + interval, t)) return
     n = aint(t/interval)
-    do while (n*interval <= t + same_time)
+    do while (has_come(n*interval, t))
       n = n + 1.0_wp
     end do
     next = n*interval
@@ -99,9 +98,9 @@ contains
     real(wp) :: landing, way
 
     landing = self%run%t_end
-    if (next_release > self%t + same_time) landing = min(landing, next_release)
+    if (.not. has_come(next_release, self%t)) landing = min(landing, next_release)
     way = landing - self%t
-    if (way <= dt_allowed*(1.0_wp + 1.0e-9_wp) .or. way <= same_time) then
+    if (way <= dt_allowed*(1.0_wp + 1.0e-9_wp) .or. has_come(landing, self%t)) then
       self%dt = way
       self%t_next = landing
     else
@@ -116,7 +115,7 @@ contains
     class(clock_t), intent(in) :: self
     logical :: yes
 
-    yes = self%t >= self%run%t_end - same_time .or. self%settled()
+    yes = has_come(self%run%t_end, self%t) .or. self%settled()
   end function finished
 
   !> Have all blocks been at rest for `rest_time`, with none to come, in a run that ends then?
@@ -125,7 +124,7 @@ contains
     logical :: yes
 
     yes = self%run%stop_when_settled .and. self%rest_began >= 0.0_wp &
-      .and. self%t - self%rest_began >= self%run%rest_time - same_time
+      .and. has_come(self%rest_began + self%run%rest_time, self%t)
   end function settled
 
 end module clock_m

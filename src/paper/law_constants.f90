@@ -5,7 +5,7 @@ module law_constants_m
   use contact_law_m, only: contact_law_t, stiffness_t, power
   implicit none
   private
-  public :: law_constants_t, law_constants
+  public :: law_constants
 
   type, extends(contact_law_t) :: law_constants_t
     real(wp) :: k_n = 0.0_wp, eta_n = 0.0_wp   !! [N/m^gamma_n], [N s/m]

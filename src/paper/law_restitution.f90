@@ -6,7 +6,7 @@ module law_restitution_m
   use contact_law_m, only: contact_law_t, stiffness_t
   implicit none
   private
-  public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
+  public :: law_restitution, restitution_of, impact_duration, damping_ratio_of
   public :: min_restitution
 
   !> Smaller values act as this: contact ends at zero force, so a block comes out of its support

@@ -6,6 +6,7 @@
 !! blocks along as bodies. What contacts remember of their past is not taken over.
 module start_bodies_m
   use kinds_m, only: wp, name_length
+  use moments_m, only: has_come
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t, body_input_t, begun_t
   use named_files_m, only: found_file
@@ -18,7 +19,7 @@ module start_bodies_m
   private
   public :: read_start, with_begun
 
-  real(wp), parameter :: same_time = 1.0e-9_wp   !! times this close are one [s]
+  real(wp), parameter :: same_time = 1.0e-9_wp   !! times this close are one, over them [-]
   real(wp), parameter :: same_mass = 1.0e-9_wp   !! masses this close are one [-]
 
 contains
@@ -93,7 +94,7 @@ contains
         if (row > 0) then
           left%time = time(row)
           free = fixed == 0
-          taken = free .and. release_time <= left%time + same_time
+          taken = free .and. has_come(release_time, left%time)
           call read_row('position', 3, left%x)
           call read_row('quaternion', 4, left%q)
           call read_row('velocity', 3, left%v)
@@ -126,10 +127,10 @@ contains
 
     row = size(time)
     if (case%start%time < 0.0_wp .and. row > 0) return
-    row = count(time <= case%start%time + same_time)
+    row = count(time <= case%start%time*(1.0_wp + same_time))
     if (size(time) == 0) then
       call report(case, 'holds no rows', problems)
-    else if (row == 0 .or. case%start%time > time(size(time)) + same_time) then
+    else if (row == 0 .or. case%start%time*(1.0_wp - same_time) > time(size(time))) then
       row = 0
       call problems%add_message('&start time = '//to_text(case%start%time)//': the run in ' &
         //quoted_text(case%start%file)//' goes from '//to_text(time(1))//' to ' &

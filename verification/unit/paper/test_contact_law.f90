@@ -4,8 +4,7 @@ module test_contact_law_m
   use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, stiffness_t, stored_energy, normal_force, &
     tangential_force, tangential_slip
-  use law_restitution_m, only: law_restitution_t, restitution_of, impact_duration, damping_ratio_of
-  use law_constants_m, only: law_constants_t
+  use law_restitution_m, only: restitution_of, impact_duration, damping_ratio_of
   use contact_laws_m, only: choose_law
   implicit none
   private
@@ -50,11 +49,12 @@ contains
   subroutine check_hardening()
     real(wp), parameter :: zeta(3) = [0.0_wp, 0.4_wp, 1.0_wp], hard = 0.2_wp, step = 1.0e-6_wp
     real(wp), parameter :: linear(3) = [1.0_wp, 0.603_wp, 0.368_wp]   !! depth of the linear spring
-    type(law_restitution_t) :: law
+    class(contact_law_t), allocatable :: law
     type(stiffness_t) :: elastic, beside(2)
     real(wp) :: d, v, deepest, slope
     integer :: m
 
+    call choose_law(contact_input_t(), law)
     do m = 1, 5
       d = 0.15_wp*hard*real(m, wp)**2
       call law%normal_stiffness(3.0_wp, d + [-step, step], hard, beside)
@@ -91,11 +91,12 @@ contains
     real(wp), intent(in) :: zeta, hard   !! damping ratio, depth at which the spring hardens
     integer, intent(in) :: steps         !! over four units of time
     real(wp), intent(out) :: back, deepest
-    type(law_restitution_t) :: law
+    class(contact_law_t), allocatable :: law
     type(stiffness_t) :: elastic
     real(wp) :: d, v, dt, force, eta
     integer :: i
 
+    call choose_law(contact_input_t(), law)
     dt = 4.0_wp/real(steps, wp)
     d = 0.0_wp
     v = 1.0_wp
@@ -194,11 +195,14 @@ contains
 
   !> Equations (1) and (2) for one contact point.
   subroutine check_forces()
-    type(law_constants_t) :: law
+    class(contact_law_t), allocatable :: law
+    type(contact_input_t) :: input
     type(stiffness_t) :: elastic
     real(wp) :: f(3), xi(3), v(3)
 
-    law%gamma_n = 1.5_wp
+    input%law = 'constants'
+    input%gamma_n = 1.5_wp
+    call choose_law(input, law)
     call law%normal_stiffness(1.0e5_wp, 1.0e-4_wp, 1.0e-5_wp, elastic)
     call check('spring alone', elastic%force, 0.1_wp, 1.0e-15_wp)
     call check('its energy', elastic%energy, 4.0e-6_wp, 1.0e-20_wp)
