@@ -168,6 +168,27 @@ def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
 
 
+@pytest.mark.parametrize("width", [390, 1400])
+def test_names_of_many_units_leave_them_seen(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    """Of forty units on a roundhead no two names meet, and each is on its unit."""
+    monkeypatch.chdir(MICS.parent)
+    path = tmp_path / "check.html"
+    words = ["check", "input/roundhead.nml", "--program", str(MICS), "--page", "--out", str(path)]
+    assert mics_tools(words) == 0
+    browser.open(path, width, 844)
+    stage = "planPlayer.stage"
+    labels = browser.run(f"{stage}.overlay.labels")
+    assert width / 200 <= len(labels) <= 40 and all(re.fullmatch("[A-E][0-9]+", p[0]) for p in labels)
+    for k, (_, x, y, wide) in enumerate(labels):
+        assert all(abs(x - u) > (wide + w) / 2 or abs(y - v) > 12 for _, u, v, w in labels[:k])
+    number = "(k => k ? s.scene.bodies[k - 1].number : '')"
+    at = "s.seen.at(Math.floor(x / 4), Math.floor(y / 4))"
+    seen = f"(s => s.overlay.labels.map(([n, x, y]) => {number}({at})))({stage})"
+    assert browser.run(seen) == [p[0] for p in labels]
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_it_fits_a_phone(browser: Browser, page: Path, dark: bool) -> None:
     browser.open(page, 360, 740, dark)

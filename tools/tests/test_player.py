@@ -271,8 +271,8 @@ def test_numbers_stand_on_their_blocks(browser: Browser, page: Path) -> None:
         view(browser, name)
         labels = browser.run("runPlayer.stage.overlay.labels")
         assert len(labels) >= 6
-        assert len({number for number, _, _ in labels}) == len(labels)
-        for number, x, y in labels:
+        assert len({number for number, *_ in labels}) == len(labels)
+        for number, x, y, _ in labels:
             on = browser.run(
                 "((s, x, y) => s.seen.at(Math.floor(x / s.overlay.wide * s.seen.w),"
                 " Math.floor(y / s.overlay.high * s.seen.h)))"

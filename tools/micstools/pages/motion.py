@@ -61,7 +61,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
     return {
         "bodies": [
             {
-                "number": k + 1,
+                "number": b.name[k] or k + 1,
                 "shape": names.index(b.shape[k]),
                 "fixed": bool(b.fixed[k]),
                 "wall": k in walls,

@@ -5,7 +5,7 @@
 const AXES = [['x', '#d1495b'], ['y', '#3f9b5b'], ['z', '#4a8fd9']];
 const LEAST = 12; // squares of the map of blocks that a number needs
 const MOST = 20000; // points of all paths
-const LONG = 46, HIGH = 13; // room of a label [pixels]
+const HIGH = 13; // room of a label [pixels]
 const FONT = '12px system-ui, "Liberation Sans", sans-serif';
 
 class Overlay {
@@ -34,6 +34,7 @@ class Overlay {
     pen.clearRect(0, 0, wide, high);
     pen.font = FONT;
     pen.lineCap = pen.lineJoin = 'round';
+    this.labels = []; // text, middle and width of each
     if (this.paths) this.drawPaths();
     if (stage.flat) this.drawRulers();
     if (stage.seen) this.drawNumbers();
@@ -69,43 +70,49 @@ class Overlay {
     pen.stroke();
   }
 
-  // Each block has its number where it is seen, unless too little of it is.
+  // Each block has its number where it is seen, those of which most is seen first; none where that
+  // is far wider than the block or meets another one. Of a few each has its long label.
   drawNumbers() {
-    const { seen, scene } = this.stage, sums = new Map();
+    const { seen, scene } = this.stage, sums = new Map(), pen = this.pen;
     for (let y = 0; y < seen.h; y++) for (let x = 0; x < seen.w; x++) {
       const k = seen.at(x, y);
       if (!k) continue;
-      const sum = sums.get(k) || sums.set(k, { n: 0, x: 0, y: 0, low: x, high: x, first: y }).get(k);
+      const sum = sums.get(k) || sums.set(k, { k, n: 0, x: 0, y: 0, low: x, high: x, first: y }).get(k);
       sum.n++; sum.x += x; sum.y += y;
       [sum.low, sum.high, sum.last] = [Math.min(sum.low, x), Math.max(sum.high, x), y];
     }
-    this.labels = [];
-    this.pen.font = `bold ${FONT}`;
-    for (const [k, sum] of sums) {
-      if (sum.n < LEAST) continue;
+    pen.font = `bold ${FONT}`;
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    for (const sum of [...sums.values()].sort((p, q) => q.n - p.n)) {
+      const { number, label } = scene.bodies[sum.k - 1], text = label || number;
+      const wide = pen.measureText(text).width;
+      if (sum.n < LEAST || !label && wide > 1.5 * (sum.high - sum.low + 1) / seen.w * this.wide) continue;
       let x = sum.x / sum.n, y = sum.y / sum.n;
-      if (seen.at(Math.round(x), Math.round(y)) !== k) [x, y] = this.nearest(k, sum);
-      const number = scene.bodies[k - 1].label || scene.bodies[k - 1].number;
+      if (seen.at(Math.round(x), Math.round(y)) !== sum.k) [x, y] = this.nearest(sum.k, sum);
       const place = [(x + 0.5) / seen.w * this.wide, (y + 0.5) / seen.h * this.high];
-      if (scene.bodies[k - 1].label) this.giveRoom(place);
-      this.labels.push([number, ...place]);
-      this.pen.lineWidth = 3;
-      this.pen.textAlign = 'center';
-      this.pen.textBaseline = 'middle';
-      this.pen.strokeStyle = '#ffffff';
-      this.pen.strokeText(number, ...place);
-      this.pen.fillStyle = '#14181c';
-      this.pen.fillText(number, ...place);
+      if (label) this.giveRoom(place, wide);
+      if (this.taken(place, wide)) continue;
+      this.labels.push([text, ...place, wide]);
+      pen.lineWidth = 3;
+      pen.strokeStyle = '#ffffff';
+      pen.strokeText(text, ...place);
+      pen.fillStyle = '#14181c';
+      pen.fillText(text, ...place);
     }
-    this.pen.font = FONT;
+    pen.font = FONT;
+  }
+
+  // Is there a label already where one so wide would stand?
+  taken(place, wide) {
+    return this.labels.some(([, x, y, w]) =>
+      Math.abs(x - place[0]) < (w + wide) / 2 + 2 && Math.abs(y - place[1]) < HIGH);
   }
 
   // Moves a long label down until it stands on no other; a line leads to a distant one.
-  giveRoom(place) {
-    const taken = () => this.labels.some(([, x, y]) =>
-      Math.abs(x - place[0]) < LONG && Math.abs(y - place[1]) < HIGH);
+  giveRoom(place, wide) {
     const [x, y] = place;
-    for (let tries = 0; tries < 12 && taken(); tries++) place[1] += HIGH;
+    for (let tries = 0; tries < 12 && this.taken(place, wide); tries++) place[1] += HIGH;
     if (place[1] > y + HIGH) this.line([[x, y], [x, place[1] - HIGH / 2]], this.ink, 0.7);
   }
 

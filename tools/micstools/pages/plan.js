@@ -82,7 +82,9 @@ class PlanLayer {
         const back = s => [x1 - 9 * ux - 4 * s * uy, y1 - 9 * uy + 4 * s * ux];
         overlay.line([back(1), [x1, y1], back(-1)], plan.colour, 2);
       }
-      overlay.write(name, seen[0][0], seen[0][1] - 12, 'center', plan.colour);
+      const place = [seen[0][0], seen[0][1] - 12], wide = pen.measureText(name).width;
+      while (overlay.taken(place, wide)) place[1] -= HIGH;
+      overlay.write(name, ...place, 'center', plan.colour);
     }
     this.marks = [];
     for (const mark of plan.marks) for (const k of [...mark.bodies, ...mark.at.map(p => p)]) {

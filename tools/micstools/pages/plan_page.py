@@ -21,7 +21,8 @@ const planPlayer = startPlan(document.getElementById('player'));
 if (planPlayer) planPlayer.load(read('scene'));
 """
 SCRIPTS = ("plan",)
-_TIMED = 40  # blocks to come whose labels bear their times; more would hide the picture
+_TIMED = 12  # blocks to come whose labels bear their times; more would hide the picture
+_MARKED = 40  # blocks of a group that its warning marks
 _LINES = 160  # faces of cells that are drawn in a direction
 _COLOUR = "#8560b8"  # of ways and reaches
 _LONG = 90  # letters of a text of the plan that takes the whole width
@@ -179,8 +180,8 @@ def scene(found: SetUp, north: float | None = None) -> dict[str, Any]:
         still = motion.blocks(run, np.array([0, 0]))
         packed |= still | {"times": motion.packed([0.0, last], "f4")}
     for k in come if len(come) <= _TIMED else []:
-        unit = found.name[k] or str(k + 1)
-        packed["bodies"][k]["label"] = f"{unit}: {figure(float(b.release_time[k]))} s"
+        block = packed["bodies"][k]
+        block["label"] = f"{block['number']}: {figure(float(b.release_time[k]))} s"
     for k in come:
         if b.release_time[k] <= 0:  # it comes in at the start, and is a ghost before
             packed["bodies"][k]["release"] = 1e-6
@@ -275,7 +276,7 @@ def marks(found: SetUp) -> list[dict[str, Any]]:
     for number, remark in enumerate(found.warnings, 1):
         bodies, places = found.bodies_of(remark), _places(found.run, remark)
         if bodies or places:
-            said.append({"number": number, "bodies": bodies[:_TIMED], "at": places})
+            said.append({"number": number, "bodies": bodies[:_MARKED], "at": places})
     return said
 
 

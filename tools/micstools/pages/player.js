@@ -51,7 +51,7 @@ class Player {
     this.root.classList.toggle('still', this.still);
     this.follow.replaceChildren(new Option('whole tank', ''), ...scene.bodies
       .map((body, k) => [body, k]).filter(([body]) => !body.fixed && body.release !== null)
-      .map(([body, k]) => new Option('block ' + body.number, k)));
+      .map(([body, k]) => new Option(Number.isInteger(body.number) ? `block ${body.number}` : body.number, k)));
     this.wet.closest('label').hidden = !scene.water;
     this.wet.querySelector('[value=speed]').hidden = !(scene.water && scene.water.speed);
     if (this.stage.wet === 'speed' && !(scene.water && scene.water.speed)) this.wet.value = this.stage.wet = 'clear';

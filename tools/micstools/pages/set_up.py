@@ -57,7 +57,6 @@ class SetUp:
     line: IntArray  # (N) of each body in the case
     place: Array  # (N, 3) before the random shift [m]
     spread: Array  # (N, 3) the random shift at most [m]
-    name: list[str]  # (N) of each unit in the plan, empty where it has none
 
     def entry(self, heading: str, name: str) -> str:
         """What the plan says under a name; empty where it says nothing."""
@@ -114,18 +113,15 @@ def _found(run: Run, text: str, said: str) -> SetUp:
     with h5py.File(run.folder / "run.h5") as h5:
         plan = {name: h5["plan"][name][:] for name in ("line", "place", "spread")}
         due = h5["bodies/release_time"][:]
-        known = "name" in h5["bodies"]
-        names = h5["bodies/name"].asstr()[:] if known else [""] * len(due)
     # nothing waits for room yet
     run.__dict__["bodies"] = replace(run.bodies, release_time=due, entry_time=due)
     warnings = [line for line in said.splitlines() if line.startswith(_WARNING)]
     remarks = [remark_of(line.removeprefix(_WARNING), text) for line in warnings]
-    units = [str(name).strip("\0 ") for name in names]
     parts = parts_of(said)
     if told := falls.falls(run, plan["line"]):
         steps = next(k for k, part in enumerate(parts) if part.heading == "Time steps")
         parts.insert(steps, Part("Falls", [(name, "; ".join(words)) for name, words in told]))
-    return SetUp(run, text, parts, remarks, **plan, name=units)
+    return SetUp(run, text, parts, remarks, **plan)
 
 
 def spans(text: str) -> list[tuple[str, int, int]]:
