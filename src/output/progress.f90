@@ -157,8 +157,8 @@ contains
       //fixed_text(seconds, 1)//' s'
     if (self%fluid .and. steps > 0) line = line//', ' &
       //fixed_text(1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), 3)//' us per cell and step'
-    if (self%clips > 0) line = line//', inertia of fluid cut ' &
-      //to_text(int(min(self%clips, int(huge(1), i8))))//' times'
+    if (self%clips > 0) line = line//', impacts of light blocks less exact (inertia of water cut ' &
+      //to_text(int(min(self%clips, int(huge(1), i8))))//' times)'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
     call say('results in '//folder, self)

@@ -145,7 +145,9 @@ def test_motions_do_not_depend_on_the_origin(far_pile: Run, tmp_path: Path) -> N
 def test_places_in_a_survey_are_told_to_the_centimetre(far_pile: Run) -> None:
     said = run_words.drops(far_pile, units.of_run(far_pile))[0]
     page = run_page.page(far_pile)
-    assert re.search(r"354206\.\d\d?, 5621082\.\d\d?, -9\.\d\d?", page)  # of a block at the end
+    columns = re.findall(r"<td>(3542\d\d[\d.]*), (5621[\d.]*), ([\d.-]*)</td>", page)
+    assert "354206" in {x.split(".")[0] for x, _, _ in columns}  # of a block at the end
+    assert {len(v.split(".")[1]) for row in columns for v in row} == {2}  # alike in a column
     assert "x\u00a0=\u00a0354205, y\u00a0=\u00a05621081.67, z\u00a0=\u00a0-6.67 m" in said
 
 

@@ -140,6 +140,7 @@ def test_the_command_prints_units_by_the_size_of_the_blocks(make_run, capsys) ->
     assert rows["plan_area"].endswith(" m2") and rows["contact_force"].endswith(" kN")
     assert rows["time_to_rest"].endswith(" s") and rows["impact_speed"].endswith(" m/s")
     assert rows["box"].count(",") == 5 and rows["box"].endswith(" m")
+    assert rows["porosity"].endswith(", of the box above the bed")
     assert "overlap of the pile below 0.00667 m" in said
     assert json.loads((run.folder / "pile.json").read_text())["units"]["contact_force"] == "N"
 

@@ -72,6 +72,21 @@ def test_warnings_find_their_places(found: SetUp) -> None:
     assert places[by_group["fluid"]]["at"] == [[12, 6, 8]]
 
 
+def test_warnings_of_one_kind_are_one(tmp_path: Path, capfd) -> None:
+    """With a count, and all their blocks marked; two are told one by one."""
+    drops = "&drop shape = 'cube'  position = 6, 3, 5  first_time = {} /\n"
+    text = CASE + "".join(drops.format(10 + k) for k in range(36))
+    with set_up.read(MICS, text) as found:
+        late = [w for w in found.warnings if w.variable == "count"]
+        assert [w.place for w in late] == [" (line 9; 36 more of this kind, the last in 46)"]
+        assert found.bodies_of(late[0]) == list(range(4, 42))
+    case = tmp_path / "case.nml"
+    case.write_text(text)
+    assert mics_tools(["check", str(case), "--program", str(MICS)]) == 0
+    said = capfd.readouterr().out
+    assert said.count("warning: &drop count") == 1 and "36 more of this kind" in said
+
+
 def test_the_scene_has_what_comes(found: SetUp, page: Path) -> None:
     scene = scene_of(page)
     plan, bodies = scene["plan"], scene["bodies"]
@@ -180,7 +195,8 @@ def test_names_of_many_units_leave_them_seen(
     browser.open(path, width, 844)
     stage = "planPlayer.stage"
     labels = browser.run(f"{stage}.overlay.labels")
-    assert width / 200 <= len(labels) <= 40 and all(re.fullmatch("[A-E][0-9]+", p[0]) for p in labels)
+    assert width / 200 <= len(labels) <= 40
+    assert all(re.fullmatch("[A-E][0-9]+", name) for name, *_ in labels)
     for k, (_, x, y, wide) in enumerate(labels):
         assert all(abs(x - u) > (wide + w) / 2 or abs(y - v) > 12 for _, u, v, w in labels[:k])
     number = "(k => k ? s.scene.bodies[k - 1].number : '')"

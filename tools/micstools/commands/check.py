@@ -18,7 +18,10 @@ def _print(given: argparse.Namespace) -> int:
     """The plan as the program prints it, then the falls of the blocks."""
     with tempfile.TemporaryDirectory(prefix="mics-plan-") as folder:
         file = Path(folder, "run.h5")
-        code = call(given, ["--check", "--plan", str(file)])
+        with Path(folder, "plan").open("w+") as out:
+            code = call(given, ["--check", "--plan", str(file)], out)
+            out.seek(0)
+            print(set_up.shorter(out.read()), end="", flush=True)
         if code or not file.exists():
             return code
         with h5py.File(file) as h5:

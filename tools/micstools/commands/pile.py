@@ -64,7 +64,8 @@ def _of_run(given: argparse.Namespace) -> int:
     found = asdict(numbers)
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
-        print(f"     {name:20}{pile_numbers.words(chosen, name, values)}")
+        meaning = pile_numbers.MEANING.get(name, "")
+        print(f"     {name:20}{pile_numbers.words(chosen, name, values)}{meaning}")
     top = maps.top_of(run, step)
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})

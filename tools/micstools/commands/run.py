@@ -4,19 +4,21 @@ import argparse
 import os
 import subprocess
 from contextlib import suppress
+from typing import IO, Any
 
 from micstools.cases import program
 
 
-def call(given: argparse.Namespace, options: list[str]) -> int:
-    """The program on the case; it reads the case as it is where nothing was set."""
+def call(given: argparse.Namespace, options: list[str], out: IO[str] | None = None) -> int:
+    """The program on the case; it reads the case as it is where nothing was set. `out`: in place of
+    standard output."""
     text = program.case_text(given.case, given.settings)
     path = program.find(given.program, given.case)
     settings = {**program.ENVIRONMENT, **os.environ}
+    how: dict[str, Any] = {"text": True, "env": settings, "stdout": out}
     if not given.settings:
-        return _code(subprocess.Popen([path, *options, given.case], text=True, env=settings))
-    pipe = subprocess.PIPE
-    with subprocess.Popen([path, *options], stdin=pipe, text=True, env=settings) as process:
+        return _code(subprocess.Popen([path, *options, given.case], **how))
+    with subprocess.Popen([path, *options], stdin=subprocess.PIPE, **how) as process:
         # The program has the signal, too, and ends in good order.
         with suppress(KeyboardInterrupt, BrokenPipeError):
             process.communicate(text)

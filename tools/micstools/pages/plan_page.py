@@ -107,7 +107,7 @@ def _warnings(found: SetUp) -> Markup | None:
             tag("button", str(n), type="button", data_mark=n, aria_label=f"show where: {w.text}")
             if n in marked
             else tag("b", str(n)),
-            tag("span", w.text, f" (line {w.line})" if w.line else ""),
+            tag("span", w.text, w.place),
         )
         for n, w in enumerate(found.warnings, 1)
     ]

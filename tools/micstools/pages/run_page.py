@@ -133,7 +133,7 @@ def _facts(run: Run, found: Found) -> Markup:
             ("blocks", n.blocks, f"{shown.mass.text(mass)} in all"),
             ("height of the pile", shown.length.text(n.height), f"above the {_ground(run)}"),
             ("layer thickness", shown.length.text(n.layer_thickness),
-             f"mean; {percent(n.layer_porosity)} void"),
+             f"on average; porosity {percent(n.layer_porosity)}"),
             ("plan covered", shown.area.text(n.plan_area),
              f"{percent(n.plan_area / n.footprint)} of a footprint of "
              f"{shown.area.text(n.footprint)}"),
@@ -191,10 +191,10 @@ def _places(given: Handover, shown: Units) -> Markup:
         [
             p.unit,
             *([p.name] if "name" in heads else []),
-            ", ".join(shown.place.figure(v) for v in (p.x, p.y, p.z)),
+            ", ".join(shown.place.column(v) for v in (p.x, p.y, p.z)),
             number(p.heading_deg, ".0f"),
             number(p.tilt_deg, ".0f"),
-            *(["fixed" if p.fixed else shown.place.figure(p.deviation)] if within else []),
+            *(["fixed" if p.fixed else shown.place.column(p.deviation)] if within else []),
             "yes" if p.at_rest else "no",
             p.touching or "–",
         ]
@@ -234,7 +234,7 @@ def _farther_off(given: Handover, within: Within, shown: Units) -> list[Markup]:
     if not off:
         return []
     rows: list[list[object]] = [
-        [f"{p.unit} {p.name}".strip(), *(shown.place.figure(v) for v in
+        [f"{p.unit} {p.name}".strip(), *(shown.place.column(v) for v in
          (p.deviation, p.x - p.plan_x, p.y - p.plan_y, p.z - p.plan_z)), number(p.tilt_deg, ".0f")]
         for p in off
     ]  # fmt: skip
@@ -260,7 +260,7 @@ def _blocks(run: Run, found: Found) -> Markup:
             figure(k.contact_force / k.weight) if k.weight else "–",
             force.figure(k.fluid_force),
             number(k.turned, ".0f"),
-            ", ".join(found.units.place.figure(v) for v in k.place),
+            ", ".join(found.units.place.column(v) for v in k.place),
         ]
         for k in found.blocks
     ]

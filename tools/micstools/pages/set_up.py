@@ -22,6 +22,8 @@ _NAMED = re.compile(r"&(\w+)\s+(\w+)?")
 _WARNING = "  warning: "
 _LABEL = 2 + 24  # columns of the names in the plan
 _TABLES = ("Shapes",)  # parts of the plan in columns of a fixed width
+_FIGURE = re.compile(r"\d[\d.]*(e[+-]?\d+)?")
+_MANY = 3  # messages that differ in their figures alone are told as one
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,15 @@ class Remark:
     variable: str = ""
     occurrence: int = 0  # of the group, from 0
     line: int = 0  # of the case, 0: not told
+    more: tuple["Remark", ...] = ()  # of its kind
+
+    @property
+    def place(self) -> str:
+        """Its line, and how many more there are."""
+        said = [f"line {self.line}"] if self.line else []
+        if self.more:
+            said.append(f"{len(self.more)} more of this kind, the last in {self.more[-1].line}")
+        return f" ({'; '.join(said)})" if said else ""
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,11 @@ class SetUp:
         return next((text for label, text in pairs if label == name), "")
 
     def bodies_of(self, remark: Remark) -> list[int]:
-        """Numbers, from 0, of the bodies that a remark concerns."""
+        """Numbers, from 0, of the bodies that a remark and those of its kind concern."""
+        found = [k for one in (remark, *remark.more) for k in self._bodies_of(one)]
+        return list(dict.fromkeys(found))
+
+    def _bodies_of(self, remark: Remark) -> list[int]:
         if remark.group == "shape":
             name = settings.value(self.text, "shape", "name", remark.occurrence)
             wanted = re.escape(str(name or "").strip())
@@ -115,13 +130,29 @@ def _found(run: Run, text: str, said: str) -> SetUp:
         due = h5["bodies/release_time"][:]
     # nothing waits for room yet
     run.__dict__["bodies"] = replace(run.bodies, release_time=due, entry_time=due)
-    warnings = [line for line in said.splitlines() if line.startswith(_WARNING)]
-    remarks = [remark_of(line.removeprefix(_WARNING), text) for line in warnings]
     parts = parts_of(said)
     if told := falls.falls(run, plan["line"]):
         steps = next(k for k, part in enumerate(parts) if part.heading == "Time steps")
         parts.insert(steps, Part("Falls", [(name, "; ".join(words)) for name, words in told]))
-    return SetUp(run, text, parts, remarks, **plan)
+    return SetUp(run, text, parts, _warnings(said, text), **plan)
+
+
+def shorter(plan: str) -> str:
+    """The plan as the program prints it, with one warning of each kind."""
+    lines = [line for line in plan.splitlines() if not line.startswith(_WARNING)]
+    lines += [f"{_WARNING}{remark.text}{remark.place}" for remark in _warnings(plan, "")]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _warnings(plan: str, text: str) -> list[Remark]:
+    """Of a plan as printed; many that differ in their figures alone are one."""
+    lines = [line for line in plan.splitlines() if line.startswith(_WARNING)]
+    remarks = [remark_of(line.removeprefix(_WARNING), text) for line in lines]
+    names = [_FIGURE.sub("", remark.text) for remark in remarks]
+    found: dict[str, list[Remark]] = {}
+    for remark, name in zip(remarks, names, strict=True):
+        found.setdefault(name if names.count(name) >= _MANY else remark.text, []).append(remark)
+    return [replace(first, more=tuple(more)) for first, *more in found.values()]
 
 
 def spans(text: str) -> list[tuple[str, int, int]]:

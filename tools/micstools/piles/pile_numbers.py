@@ -36,11 +36,11 @@ class PileNumbers:
     peak_force: float  # the same within a step: an impact's impulse over contact_time [N]
     slopes: tuple[float, float, float, float]  # of the sides towards -x, +x, -y, +y [degrees]
     attitude_randomness: float  # of the free blocks of the commonest shape; 0 alike, 1 random
-    porosity: float  # of the box, above the bed
+    porosity: float
     box: tuple[float, ...]  # its low and its high corner [m]
     height: float  # largest, of the top above the floor or the bed under it [m]
     layer_thickness: float  # mean of the same over the plan area [m], upright
-    layer_porosity: float  # of the layer: plan area times thickness
+    layer_porosity: float
     footprint: float  # the smallest convex plan that holds the pile [m2]
     thickness_ball: float  # of the layer as `piles.layer` defines it, by the ball [m]
     coefficient_ball: float  # layer coefficient of as many layers as fit best
@@ -56,6 +56,12 @@ KINDS = {
     "layer_thickness": "length", "footprint": "area", "thickness_ball": "length",
 }  # fmt: skip
 """What the numbers that have a unit are, as `Units` names it."""
+MEANING = {
+    "porosity": ", of the box above the bed",
+    "layer_porosity": ", of the plan area times the thickness on average",
+    "porosity_ball": ", of the layer by the ball",
+}
+"""Of numbers that are taken for each other."""
 
 
 def unit(units: Units, name: str) -> Unit:

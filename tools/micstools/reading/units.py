@@ -48,7 +48,12 @@ class Unit:
         """A value in SI as a figure without its unit; a place to its decimals, not to `digits`."""
         if self.decimals is None or not np.isfinite(value):
             return figure(self.of(value), digits)
-        return _without_zeros(f"{round(self.of(value), self.decimals) + 0.0:.{self.decimals}f}")
+        return _without_zeros(self.column(value))
+
+    def column(self, value: float) -> str:
+        """A place in SI as a figure in a column of them: all have their decimals."""
+        rounded = round(self.of(value), self.decimals) + 0.0
+        return f"{rounded:.{self.decimals}f}" if np.isfinite(value) else figure(value)
 
     def text(self, value: float, digits: int = 3) -> str:
         """A value in SI with its unit; a dash where it is nan."""
