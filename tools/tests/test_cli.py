@@ -1,18 +1,23 @@
 """`mics-tools`: commands help, refuse wrong use in one line, and set variables of a case."""
 
+import os
+import pty
 import shlex
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from calls import mics_tools, python
+from calls import ROOT, mics_tools, python
 from calls import program as stand_in
 from micstools import cli
 from micstools.cases import program as program_of_tools
 from micstools.cases import settings
 from micstools.reading.reader import BadRun, Run
+from synthetic import Motion, write_run
 from test_height_maps import ESRI
 
 CASE = """\
@@ -148,6 +153,34 @@ def test_a_run_goes_on_and_keeps_its_time(tmp_path: Path, program: Path) -> None
         done = python("-m", *words)
         assert done.returncode == 0
         assert done.stdout.startswith("--restart mics-out/restart-a.h5 --max-wall 01"), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("more", "stdin", "variable", "opened"),
+    [("", None, "BROWSER", True), ("", subprocess.DEVNULL, "BROWSER", False),
+     ("", None, "CI", False), ("--no-browser", None, "BROWSER", False),
+     ("--quiet", None, "BROWSER", False)],
+)  # fmt: skip
+def test_a_run_ends_with_its_page(
+    more: str, stdin: int | None, variable: str, opened: bool, tmp_path: Path
+) -> None:
+    """Its path is told; where somebody sits before it, it is opened."""
+    write_run(tmp_path / "done", Motion(t_end=0.1))
+    (tmp_path / "case.nml").write_text(CASE)
+    mics = stand_in(tmp_path / "mics", "#!/bin/sh\ncp -r done mics-out\n")
+    browser = stand_in(tmp_path / "browser", f'#!/bin/sh\necho "$1" > {tmp_path}/opened\n')
+    env = {k: v for k, v in os.environ.items() if k not in ("CI", "DISPLAY", "WAYLAND_DISPLAY")}
+    env |= {"PYTHONPATH": str(ROOT / "tools"), "BROWSER": str(browser), variable: str(browser)}
+    ours, its = pty.openpty()
+    words = [sys.executable, "-m", "micstools.cli", "run", "case.nml", "--program", str(mics)]
+    where = {"cwd": tmp_path, "env": env, "stdin": stdin or its, "stdout": its}
+    assert subprocess.run([*words, *more.split()], **where).returncode == 0
+    page, found = tmp_path / "mics-out" / "report.html", tmp_path / "opened"
+    assert page.exists() == (more != "--quiet")
+    assert not page.exists() or b"mics-out/report.html (" in os.read(ours, 4096)
+    assert found.exists() == opened and (not opened or found.read_text().strip() == page.as_uri())
+    os.close(ours)
+    os.close(its)
 
 
 def test_the_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
