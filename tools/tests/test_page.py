@@ -160,6 +160,23 @@ def test_the_surface_is_that_of_the_fields(loose_pile: Run) -> None:
     assert found[-1].mean() == pytest.approx(0.1612, abs=1e-4)
 
 
+def test_numbers_that_would_meet_are_left_out() -> None:
+    """Of two blocks side by side the one has its number of which more is seen."""
+    block = np.zeros((100, 200), int)
+    block[:, :60], block[:, 60:70], block[40:60, 150:] = 1, 2, 3
+    seen = views.Seen(block, block, block, np.zeros(2), 1.0)
+    assert [re.sub("<.*?>", "", text) for text in views._numbers(seen)] == ["1", "3"]
+    block[:, 30:60] = 0
+    assert [re.sub("<.*?>", "", text) for text in views._numbers(seen)] == ["1", "2", "3"]
+
+
+def test_a_column_has_the_same_decimals() -> None:
+    column = SITE.number.column
+    assert column([0.5, 12.34, np.nan, 9]) == ["0.5", "12.3", "–", "9.0"]
+    assert column([585.0, 4.9]) == ["585", "5"] and column([]) == [] and column([0.0]) == ["0.00"]
+    assert SITE.place.column([1.9, -1e-9, np.nan]) == ["1.90", "0.00", "–"]
+
+
 def test_a_peak_survives_in_a_chart() -> None:
     y = np.zeros(10_000)
     y[4321] = 7.0

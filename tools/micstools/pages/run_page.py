@@ -32,7 +32,7 @@ from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
 from micstools.reading.places import Within
 from micstools.reading.reader import BadRun, Run
-from micstools.reading.units import Units, figure
+from micstools.reading.units import SI, Units, figure
 
 _START = """
 const runPlayer = startPlayer(document.getElementById('player'));
@@ -191,10 +191,10 @@ def _places(given: Handover, shown: Units) -> Markup:
         [
             p.unit,
             *([p.name] if "name" in heads else []),
-            ", ".join(shown.place.column(v) for v in (p.x, p.y, p.z)),
+            ", ".join(shown.place.column((p.x, p.y, p.z))),
             number(p.heading_deg, ".0f"),
             number(p.tilt_deg, ".0f"),
-            *(["fixed" if p.fixed else shown.place.column(p.deviation)] if within else []),
+            *((["fixed"] if p.fixed else shown.place.column([p.deviation])) if within else []),
             "yes" if p.at_rest else "no",
             p.touching or "–",
         ]
@@ -234,7 +234,7 @@ def _farther_off(given: Handover, within: Within, shown: Units) -> list[Markup]:
     if not off:
         return []
     rows: list[list[object]] = [
-        [f"{p.unit} {p.name}".strip(), *(shown.place.column(v) for v in
+        [f"{p.unit} {p.name}".strip(), *shown.place.column(
          (p.deviation, p.x - p.plan_x, p.y - p.plan_y, p.z - p.plan_z)), number(p.tilt_deg, ".0f")]
         for p in off
     ]  # fmt: skip
@@ -250,20 +250,18 @@ def _blocks(run: Run, found: Found) -> Markup:
                            f"largest contact force [{force.name}]", "in weights",
                            f"largest force of water [{force.name}]", "turned [°]",
                            f"x, y, z at the end [{length.name}]"]  # fmt: skip
-    rows: list[list[object]] = [
-        [
-            swatch(colours[k.block], f"{k.block}\u00a0{run.bodies.name[k.block - 1]}".strip()),
-            figure(k.released),
-            figure(k.at_rest),
-            figure(k.impact_speed),
-            force.figure(k.contact_force),
-            figure(k.contact_force / k.weight) if k.weight else "–",
-            force.figure(k.fluid_force),
-            number(k.turned, ".0f"),
-            ", ".join(found.units.place.column(v) for v in k.place),
-        ]
+    names = [f"{k.block}\u00a0{run.bodies.name[k.block - 1]}".strip() for k in found.blocks]
+    measured = [
+        (k.released, k.at_rest, k.impact_speed, force.of(k.contact_force),
+         k.contact_force / (k.weight or np.nan), force.of(k.fluid_force))
         for k in found.blocks
-    ]
+    ]  # fmt: skip
+    figures = zip(*map(SI.number.column, zip(*measured, strict=True)), strict=True)
+    rows: list[list[object]] = [
+        [swatch(colours[k.block], name), *figured, number(k.turned, ".0f"),
+         ", ".join(found.units.place.column(k.place))]
+        for k, name, figured in zip(found.blocks, names, figures, strict=True)
+    ]  # fmt: skip
     note = "At rest: the time after which a block stays where it ends. Forces are means over a "
     note += "time step; the force of the water includes buoyancy."
     return section("blocks", "Fall and forces of each block", _FILTER,

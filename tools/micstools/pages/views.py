@@ -219,17 +219,20 @@ class Sheet:
 
 
 def _numbers(seen: Seen) -> list[Markup]:
-    """The number of each block where it is seen, unless too little of it is."""
-    found = []
-    rows, shown = seen.block.shape[0], np.unique(seen.block[seen.block > 0])
-    kind = "number" if len(shown) <= _MANY else "number many"
-    for number in shown:
+    """The number of each block where it is seen, those of which most is seen first; none where too
+    little of it is, or where it would meet another."""
+    found, places = [], np.empty((0, 2))
+    numbers, counts = np.unique(seen.block[seen.block > 0], return_counts=True)
+    kind, size = ("number", 30) if len(numbers) <= _MANY else ("number many", 24)
+    for number in numbers[np.argsort(-counts, kind="stable")][: np.sum(counts >= 500)]:
         y, x = np.nonzero(seen.block == number)
-        if len(x) < 500:
-            continue
         nearest = int(((x - x.mean()) ** 2 + (y - y.mean()) ** 2).argmin())
-        found.append(tag("text", number, x=x[nearest], y=rows - y[nearest] + 10, class_=kind,
-                         text_anchor="middle"))  # fmt: skip
+        place = np.array([x[nearest], y[nearest]])
+        if (np.abs(places - place) < [1.3 * size, 0.8 * size]).all(axis=1).any():
+            continue
+        places = np.vstack([places, place])
+        found.append(tag("text", number, x=place[0], y=seen.block.shape[0] - place[1] + 10,
+                         class_=kind, text_anchor="middle"))  # fmt: skip
     return found
 
 

@@ -48,12 +48,17 @@ class Unit:
         """A value in SI as a figure without its unit; a place to its decimals, not to `digits`."""
         if self.decimals is None or not np.isfinite(value):
             return figure(self.of(value), digits)
-        return _without_zeros(self.column(value))
+        return _without_zeros(self.column([value])[0])
 
-    def column(self, value: float) -> str:
-        """A place in SI as a figure in a column of them: all have their decimals."""
-        rounded = round(self.of(value), self.decimals) + 0.0
-        return f"{rounded:.{self.decimals}f}" if np.isfinite(value) else figure(value)
+    def column(self, values: Iterable[float]) -> list[str]:
+        """Values in SI as figures of a column, alike in decimals: those of a place, else as many
+        as the largest needs for three digits."""
+        found = np.array([self.of(v) for v in values], float)
+        largest = np.abs(found[np.isfinite(found)]).max(initial=0.0) or 1.0
+        usual = max(0, 2 - int(np.floor(np.log10(largest))))
+        places = usual if self.decimals is None else self.decimals
+        return [f"{round(v, places) + 0.0:.{places}f}" if np.isfinite(v) else figure(v)
+                for v in found]  # fmt: skip
 
     def text(self, value: float, digits: int = 3) -> str:
         """A value in SI with its unit; a dash where it is nan."""
