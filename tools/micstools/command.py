@@ -36,12 +36,17 @@ def output_of(path: Path) -> Path:
         return path.parent
     try:
         case = settings.read(path)
-        output = settings.value(case, "run", "output")
+        output = folder_in(case)
     except BadRun as error:
         raise BadRun(f"{path}: neither a folder of results nor a case file ({error})") from error
     if "grid" not in (name for name, _, _ in settings.groups(case)):
         raise BadRun(f"{path}: neither a folder of results nor a case file (it has no &grid)")
-    return Path(str(output or OUTPUT).strip())
+    return output
+
+
+def folder_in(case: str) -> Path:
+    """The folder that the text of a case names."""
+    return Path(str(settings.value(case, "run", "output") or OUTPUT).strip())
 
 
 def open_run(path: Path) -> Run:

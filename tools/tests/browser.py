@@ -167,7 +167,7 @@ class Browser:
 
     def choose(self, name: str, value: object, event: str = "change") -> None:
         """Give a control, by its class, another value; until what follows is drawn."""
-        self.run(f"(s => {{ s.value = '{value}'; s.dispatchEvent(new Event('{event}')); }})"
+        self.run(f"(s => {{ s.value = `{value}`; s.dispatchEvent(new Event('{event}')); }})"
                  f"(document.querySelector('.{name}'))")  # fmt: skip
         self.settle()
 

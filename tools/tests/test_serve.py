@@ -36,6 +36,7 @@ from browser import Browser  # noqa: E402
 from calls import MICS, going_on, needs_mics, program, until  # noqa: E402
 from micstools.cases import settings  # noqa: E402
 from micstools.pages import set_up  # noqa: E402
+from micstools.pages.html import Markup  # noqa: E402
 from micstools.reading.reader import BadRun, Run  # noqa: E402
 from micstools.serve import living, server, studio, watch  # noqa: E402
 from micstools.serve.draft import Draft, typed  # noqa: E402
@@ -488,17 +489,39 @@ def test_a_change_keeps_the_rest(draft: Draft) -> None:
 
 def test_every_group_can_be_added(draft: Draft) -> None:
     for group in draft.groups:
-        if draft.repeats(group) or group not in draft.text:
+        if "anyOf" in draft.schema["properties"][group] or group not in draft.text:
             draft.edit({"op": "add", "group": group})
     assert [g for g, _, _ in draft.values() if g not in draft.groups] == []
     problems = draft.look()["problems"]
     assert [p["text"] for p in problems if p["group"] not in ("bed", "start")] == []  # name files
 
 
+def test_every_task_is_a_case_of_its_own(draft: Draft) -> None:
+    """Which the program accepts from any folder; its results have a folder of their own."""
+    page = studio.frame(draft, Markup(), False)
+    for task in re.findall(r"value='(\{.*?\})'", page):
+        draft.edit({"op": "new", **json.loads(task)})
+        assert draft.look()["problems"] == []
+        assert settings.value(draft.text, "run", "output") == "mics-case"
+    assert f"file = '{MICS.parent}/input/reef.csv'" in draft.text
+    draft.edit({"op": "undo"})
+    assert "physics = 'dry'" in draft.text
+    with pytest.raises(OSError, match=r"input/b\.nml"):
+        draft.edit({"op": "new", "case": "../a/b"})
+
+
+def test_the_table_of_physics_is_that_of_the_readme(draft: Draft) -> None:
+    rows = (MICS.parent / "README.md").read_text().split("## Which physics")[1].split("\n## ")[0]
+    wanted = re.findall(r"^\| (.*?) \| `'(\w+)'` \| (.*?) \|", rows, re.MULTILINE)
+    shown = studio.frame(draft, Markup(), False)
+    assert re.findall("<tr><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td>", shown) == wanted
+    assert len(wanted) == 4
+
+
 def test_the_program_judges_what_is_typed(draft: Draft) -> None:
     draft.edit({"op": "set", "group": "shape", "n": 0, "variable": "size", "value": "big"})
     (problem, *_) = draft.look()["problems"]
-    assert (problem["group"], problem["variable"], problem["n"]) == ("shape", "size", 0)
+    assert (problem["group"], problem["variable"], problem["occurrence"]) == ("shape", "size", 0)
     assert problem["short"] and not problem["short"].startswith("&")
     draft.edit({"op": "undo"})
     assert draft.look()["problems"] == []
@@ -529,6 +552,31 @@ def test_one_run_at_a_time(case: Path) -> None:
         until(lambda: living.holder(lock))
         assert post(site, "/stop", how="now")[0] == 200
         until(lambda: living.holder(lock) is None)
+
+
+def test_a_case_is_repeated_and_handed_over(case: Path) -> None:
+    """As by the commands, with their refusals; then one run has its places and its PDF."""
+    case.write_text(CASE.replace("t_end = 500", "t_end = 0.02"))
+    site = studio.site_of(case, MICS)
+
+    def live() -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(request(site, "/live")[2])
+        return {} if found["running"] else found["parts"]
+
+    with serving(site):
+        assert post(site, "/repeat", number=0, runs="x")[0] == 400
+        assert post(site, "/repeat", number=0, runs="2")[0] == 200
+        assert "nothing is left to chance" in until(live)["log"]
+        assert post(site, "/repeat", number=0, runs="2", spread="0.01", threads=1)[0] == 200
+        assert "2 of 2 runs done" in until(live)["state"]
+        assert 'data-run="1"' in live()["runs"] and 'id="pdf"' in request(site, "/watch")[2]
+        assert post(site, "/run", number=0, threads="1")[0] == 200
+        assert "Finished" in until(live)["state"]
+        assert Run(case.parent / "mics-here").provenance["threads"] == 1
+        for path, name in (("/places", "places.dxf"), ("/pdf", "report.pdf")):
+            status, said = post(site, path)
+            assert status == 200 and f"mics-here/{name}" in said["told"], said
+            assert (case.parent / "mics-here" / name).is_file()
 
 
 def test_a_studio_begun_anew_goes_on(case: Path) -> None:
@@ -617,14 +665,26 @@ def test_a_case_is_edited_run_stopped_and_reported(case: Path, browser: Browser)
     with serving(studio.site_of(case, MICS)) as address:
         browser.visit(address, 1200, 900)
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        fields = "document.querySelectorAll('#form select, #form input')"
+        assert browser.run(f"{fields}[0].id") == "run-0-physics"
+        assert "40 units: half a minute" in browser.run(f"{field('form')}.textContent")
         type_into(browser, "shape-0-size", "big")
         until(lambda: browser.run(VERDICT).startswith("Refused"))
         assert "number" in browser.run(f"{field('shape-0-size-wrong')}.textContent")
         assert browser.run(f"{field('shape-0-size')}.getAttribute('aria-invalid')") == "true"
-        assert browser.run(f"{field('run')}.disabled")
+        assert browser.run(f"{field('run')}.disabled && {field('repeats')}.disabled")
+        dim = "+getComputedStyle(document.querySelector('.player')).opacity"
+        assert browser.run(dim) < 0.5 and not browser.run(f"{field('older')}.hidden")
+        browser.run("document.querySelector('#problems .line').click()")
+        chosen = "(t => t.value.slice(t.selectionStart, t.selectionEnd))"
+        assert browser.run(f"{chosen}({field('text')})").endswith("size = 'big' /")
+        assert browser.run("studio.lineOf('drop', 'first_time', 6)") == 6
+        assert browser.run("studio.lineOf('drop', '', 0)") == 6
+        browser.run("document.querySelector('[data-show=form]').click()")
         type_into(browser, "shape-0-size", "0.06")
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
         assert browser.run(f"{field('shape-0-size-wrong')}.textContent") == ""
+        assert browser.run(dim) == 1 and browser.run(f"{field('older')}.hidden")
         assert "size = 0.06" in browser.run(f"{field('text')}.value")
         assert case.read_text() == CASE  # nothing is written before it is asked for
 
@@ -711,5 +771,10 @@ def test_a_studio_fits_a_phone(tmp_path: Path, browser: Browser) -> None:
     with serving(studio.site_of(tmp_path / "new.nml", MICS)) as address:
         browser.visit(address, 360, 740, True)
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        browser.choose("tasks", '{ "case": "hopper" }')
+        until(lambda: browser.run("studio.player.stage.scene.bodies.length") > 20)
+        assert "Rock from a split hopper" in browser.run(f"{field('text')}.value")
+        type_into(browser, "grid-0-cells", "1")
+        until(lambda: browser.run(VERDICT).startswith("Refused"))
         assert browser.run("document.documentElement.scrollWidth") <= 360
         assert not (tmp_path / "new.nml").exists()

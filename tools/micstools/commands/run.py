@@ -6,11 +6,10 @@ import subprocess
 import sys
 import webbrowser
 from contextlib import suppress
-from pathlib import Path
 from typing import IO, Any
 
-from micstools.cases import program, settings
-from micstools.command import OUTPUT
+from micstools.cases import program
+from micstools.command import folder_in
 from micstools.commands.base import Parser
 from micstools.reading.reader import BadRun
 
@@ -56,8 +55,7 @@ def work(given: argparse.Namespace) -> int:
 
 def _page(given: argparse.Namespace) -> None:
     """The page of the run, opened where somebody sits before it."""
-    text = program.case_text(given.case, given.settings)
-    folder = given.output or Path(str(settings.value(text, "run", "output") or OUTPUT).strip())
+    folder = given.output or folder_in(program.case_text(given.case, given.settings))
     try:
         Parser("report").call([str(folder)])
     except BadRun as problem:

@@ -50,7 +50,7 @@ class Live {
       often = running;
       putParts(parts);
       document.querySelectorAll('main > .row [data-stop], [data-ask]').forEach(b => { b.disabled = !running; });
-      document.querySelectorAll('#go-on').forEach(b => { b.disabled = running; });
+      document.querySelectorAll('#go-on, #pdf, #places').forEach(b => { b.disabled = running || !key; });
       if (this.key !== `${this.chosen} ${key}`) await this.showScene(`${this.chosen} ${key}`);
       if (this.player && this.player.stage.scene) moveMarks(this.player.stage.time);
       if (this.lost) tell('');
@@ -86,7 +86,7 @@ class Live {
     if (stop || button.matches('.close')) button.closest('dialog')?.close();
     if (run) { this.chosen = run; this.soon(0); }
     if (stop) await this.order('stop', { how: stop });
-    if (button.id === 'report' || button.id === 'go-on') await this.order(button.id, {});
+    if (['report', 'go-on', 'pdf', 'places'].includes(button.id)) await this.order(button.id, {});
   }
 
   // Asks for something, tells the answer, opens the page that it names.

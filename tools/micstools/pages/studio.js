@@ -15,6 +15,8 @@ class Studio {
     this.form.addEventListener('change', event => this.later(event.target, 0));
     this.form.addEventListener('submit', event => event.preventDefault());
     this.text.addEventListener('input', () => this.later(this.text));
+    this.tasks = document.getElementById('new');
+    this.tasks.addEventListener('change', () => this.begin());
     document.addEventListener('click', event => this.click(event));
     if (player) player.stage.grab = new Grab(player.stage, (body, by) => {
       this.flush();
@@ -24,15 +26,15 @@ class Studio {
   }
 
   async start() {
-    await this.rebuild();
     this.take(await ask('draft'));
+    this.rebuild();
     this.check();
   }
 
   // The form anew: groups came or went.
-  async rebuild() {
+  rebuild() {
     const open = new Map([...this.form.querySelectorAll('details')].map((d, k) => [k, d.open]));
-    this.form.innerHTML = (await ask('form')).form;
+    this.form.replaceChildren(new Form(read('schema'), document.getElementById('physics').content.cloneNode(true)).build(this.values));
     const all = [...this.form.querySelectorAll('details')];
     if (open.size === all.length) all.forEach((d, k) => { d.open = open.get(k); });
   }
@@ -42,6 +44,16 @@ class Studio {
     document.getElementById('save').disabled = false;
     clearTimeout(field.waiting);
     field.waiting = setTimeout(() => this.send(field), wait);
+  }
+
+  // The case of a task in place of this text; Undo brings that back.
+  async begin() {
+    const task = this.tasks.value;
+    this.tasks.value = '';
+    if (task === '') return;
+    this.flush();
+    this.fresh = true;
+    await this.edit({ op: 'new', ...JSON.parse(task) });
   }
 
   // Sends at once what would be sent later.
@@ -70,7 +82,7 @@ class Studio {
         if (order.op === 'set' && made !== was) throw new Error(`not changed: ${order.variable}, for the groups are others now`);
         const state = await this.post('edit', order);
         this.take(state);
-        if (order.op !== 'set' && order.op !== 'move' || was !== this.groups) await this.rebuild();
+        if (order.op !== 'set' && order.op !== 'move' || was !== this.groups) this.rebuild();
         tell('');
       } catch (problem) {
         this.wrong = true;
@@ -98,7 +110,7 @@ class Studio {
         for (const field of this.pending) clearTimeout(field.waiting);
         this.pending.clear();
         this.take(state);
-        await this.rebuild();
+        this.rebuild();
         throw Object.assign(new Error('the text of the other window is shown'), { theirs: true });
       }
       this.number = state.number;
@@ -117,7 +129,7 @@ class Studio {
   // The text and the values of the case; a field that one is in, or has changed since, stays as it is.
   take({ text, values, saved, undo, number }) {
     const here = document.activeElement, free = field => field !== here && !this.pending.has(field);
-    Object.assign(this, { number, shown: text });
+    Object.assign(this, { number, values, shown: text });
     this.groups = values.map(({ group, n }) => `${group}.${n}`).join();
     if (free(this.text)) this.text.value = text;
     for (const { group, n, values: said } of values) for (const [name, value] of Object.entries(said || {})) {
@@ -139,24 +151,28 @@ class Studio {
     let said;
     while (this.again) {
       this.again = false;
-      said = await ask('check').catch(problem => ({ problems: [{ text: problem.message }], warnings: [] }));
+      said = await ask('check').catch(problem => ({ problems: [{ text: problem.message }], warnings: 0 }));
     }
     this.checking = false;
     this.tellVerdict(said, verdict);
   }
 
   tellVerdict(said, verdict) {
-    const n = said.problems.length, w = said.warnings.length;
+    const n = said.problems.length, w = said.warnings;
     verdict.textContent = n ? `Refused: ${n === 1 ? 'one problem' : `${n} problems`}.`
       : `Accepted${w ? `, with ${w === 1 ? 'one warning' : `${w} warnings`}` : ''}.`;
     verdict.className = n ? 'look' : 'good';
-    document.getElementById('run').disabled = n > 0;
+    document.querySelectorAll('#run, #repeats').forEach(b => { b.disabled = n > 0; });
+    document.querySelector('.seen').classList.toggle('old', n > 0);
+    document.getElementById('older').hidden = !n || !this.accepted;
     this.mark(said.problems);
     if (n) return;
+    this.accepted = true;
     putParts(said.parts);
     if (!this.player) return;
-    const time = this.player.stage.scene ? this.player.stage.time : 0;
-    this.player.load(said.scene, Boolean(this.player.stage.scene));
+    const keep = Boolean(this.player.stage.scene) && !this.fresh, time = keep ? this.player.stage.time : 0;
+    this.fresh = false;
+    this.player.load(said.scene, keep);
     this.player.show(time);
   }
 
@@ -164,7 +180,7 @@ class Studio {
   mark(problems) {
     this.form.querySelectorAll('.wrong').forEach(place => { place.textContent = ''; });
     this.form.querySelectorAll('[aria-invalid]').forEach(field => field.removeAttribute('aria-invalid'));
-    const list = problems.map(({ text, short, group, variable, n }) => {
+    const list = problems.map(({ text, short, group, variable, occurrence: n, line }) => {
       const key = `${group}-${n}-${variable}`, field = document.getElementById(key);
       const place = document.getElementById(`${key}-wrong`) || this.form.querySelector(`[data-of="${group}.${n}"]`);
       if (place) place.textContent = [place.textContent, short].filter(Boolean).join('; ');
@@ -178,7 +194,13 @@ class Studio {
       button.setAttribute('aria-label', `go to: ${text}`);
       button.addEventListener('click', () => (field || place || this.text).scrollIntoView({ block: 'center' }) || (field && field.focus()));
       const words = document.createElement('span');
-      words.textContent = text;
+      words.textContent = `${text} `;
+      if (line || group) {
+        const there = document.createElement('button');
+        Object.assign(there, { type: 'button', className: 'line', textContent: `line ${this.lineOf(group, variable, line)}` });
+        there.addEventListener('click', () => this.goTo(this.lineOf(group, variable, line)));
+        words.append(there);
+      }
       item.append(button, words);
       return item;
     });
@@ -197,7 +219,9 @@ class Studio {
     if (remove) await this.edit({ op: 'remove', group: remove, n: +n });
     if (show) this.show(show);
     if (button.id === 'undo') await this.edit({ op: 'undo' });
-    if (button.id === 'save' || button.id === 'run') await this.order(button.id);
+    if (['save', 'run', 'repeat'].includes(button.id)) await this.order(button.id);
+    if (button.id === 'repeats') document.getElementById('many').showModal();
+    if (button.matches('.close')) button.closest('dialog').close();
   }
 
   show(name) {
@@ -206,13 +230,37 @@ class Studio {
     document.querySelectorAll('[data-show]').forEach(b => b.setAttribute('aria-pressed', b.dataset.show === name));
   }
 
+  // The line of a variable in its group, which the program says the line of; else that of the group.
+  lineOf(group, variable, line) {
+    const lines = this.text.value.split('\n'), begin = new RegExp(`^\\s*&${group}\\b`, 'i');
+    const first = line ? line - 1 : lines.findIndex(words => begin.test(words)), named = new RegExp(`^[^!]*\\b${variable}\\b[^!=]*=`, 'i');
+    for (let k = Math.max(first, 0); variable && k < lines.length && (k === first || !/^\s*&/.test(lines[k])); k++)
+      if (named.test(lines[k])) return k + 1;
+    return first + 1;
+  }
+
+  // Shows a line of the text.
+  goTo(line) {
+    this.show('text');
+    const { text } = this, lines = text.value.split('\n'), start = lines.slice(0, line - 1).join('\n').length + (line > 1);
+    text.focus();
+    text.setSelectionRange(start, start + lines[line - 1].length);
+    text.scrollTop = (line - 1) / lines.length * text.scrollHeight - text.clientHeight / 2;
+    text.scrollIntoView({ block: 'nearest' });
+  }
+
   // Saves or runs, once all changes have arrived.
   async order(path) {
     await this.line;
-    if (this.wrong) return;
+    const [threads, runs, spread] = ['threads', 'runs', 'spread'].map(id => document.getElementById(id));
+    if (this.wrong || ![threads, runs, spread].every(field => field.checkValidity())) {
+      [threads, runs, spread].forEach(field => field.reportValidity());
+      return;
+    }
+    document.getElementById('many').close();
     tell('…');
     try {
-      const { told, open } = await this.post(path, {});
+      const { told, open } = await this.post(path, { threads: threads.value, runs: runs.value, spread: spread.value });
       tell(told);
       if (open) location.assign(open);
       else this.take(await ask('draft'));

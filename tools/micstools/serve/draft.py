@@ -5,6 +5,7 @@ import math
 import re
 import subprocess
 import threading
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -64,10 +65,6 @@ class Draft:
         found: list[str] = about.get("anyOf", [about])[0].get("required", [])
         return found
 
-    def repeats(self, group: str) -> bool:
-        """May there be several of it?"""
-        return "anyOf" in self.schema["properties"][group]
-
     def variable(self, group: str, name: str) -> Schema:
         """A variable as the schema describes it. Raises BadRun where there is none."""
         try:
@@ -92,9 +89,10 @@ class Draft:
         return found
 
     def edit(self, order: dict[str, Any]) -> None:
-        """Change the text as ordered: `op` is set, add, copy, remove, move, text or undo."""
+        """Change the text as ordered: `op` is set, add, copy, remove, move, text, new or undo."""
         work = {"set": self._set, "add": self._add, "copy": self._copy, "remove": self._remove,
-                "move": self._move, "text": self._write, "undo": self._undo}  # fmt: skip
+                "move": self._move, "text": self._write, "undo": self._undo,
+                "new": self._begin}  # fmt: skip
         op = order.get("op")
         if op not in work:
             raise BadRun(f"no change '{op}'")
@@ -183,6 +181,21 @@ class Draft:
             raise BadRun("this is no text")
         self.text = text
 
+    @property
+    def ours(self) -> Path:
+        """The folder of the cases that come with the program, installed or in its sources."""
+        built, installed = (self.program.parents[k] for k in (0, 1))
+        share = installed / "share" / "mics"
+        return (share if (share / "input").is_dir() else built) / "input"
+
+    def _begin(self, order: dict[str, Any]) -> None:
+        """A case of ours, with its files where they are and a folder of results of its own."""
+        text = settings.read(self.ours / Path(f"{order['case']}.nml").name)
+        if Path().resolve() != self.ours.parent:
+            text = case_copy.from_here(text, self.ours.parent)
+        run = {"output": f"mics-{self.case.stem}", **order.get("run", {})}
+        self.text = settings.set_group(text, "run", run, 0)
+
     def _undo(self, _: dict[str, Any]) -> None:
         if self.before:
             self.text = self.before.pop()
@@ -197,12 +210,11 @@ class Draft:
                     if number == self.number:
                         self.seen = number
                         self._keep_bodies(found)
-                said = [_remark(w) for w in found.warnings]
                 parts = {k: v or "" for k, v in plan_page.parts(found).items()}
-                return {"problems": [], "warnings": said, "parts": parts,
+                return {"problems": [], "warnings": len(found.warnings), "parts": parts,
                         "scene": plan_page.scene(found)}  # fmt: skip
         except Refused as refused:
-            return {"problems": [_remark(r) for r in refused.remarks], "warnings": []}
+            return {"problems": [_remark(r) for r in refused.remarks], "warnings": 0}
 
     def _keep_bodies(self, found: set_up.SetUp) -> None:
         """Which group each body comes from."""
@@ -258,5 +270,4 @@ def words_of(value: Any) -> str:
 
 
 def _remark(remark: Remark) -> dict[str, Any]:
-    return {"text": remark.text, "short": _HEAD.sub("", remark.text), "group": remark.group,
-            "variable": remark.variable, "n": remark.occurrence}  # fmt: skip
+    return {**asdict(remark), "short": _HEAD.sub("", remark.text)}

@@ -5,53 +5,52 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
-from micstools.cases import program, settings
-from micstools.command import OUTPUT
-from micstools.pages.html import Markup, document, filled, markup, tag
+from micstools.cases import program
+from micstools.command import OUTPUT, folder_in
+from micstools.pages.html import Markup, data, document, filled, markup, tag
 from micstools.pages.parts import player
 from micstools.reading.reader import BadRun
-from micstools.serve import form, watch_page
+from micstools.serve import watch_page
 from micstools.serve.draft import Draft, Stale
 from micstools.serve.server import Site, apart, json_answer, order_of, page_answer
-from micstools.serve.watch import Watch, Watched
+from micstools.serve.watch import MICS_TOOLS, Ensemble, Watch, Watched
 
-SCRIPTS = ("plan", "live", "studio")
+SCRIPTS = ("plan", "live", "form", "studio")
+_CORES = os.cpu_count() or 1
+_RESULTS = ("run.h5", "ensemble.json")
 _START = "const studio = startStudio();\n"
 
 
-class Started(Watched):
-    """A run that was started here; what the program says goes to `log`."""
+class Begun(Watch):
+    """Watches what was begun here; what the program says goes to `log`."""
 
-    def __init__(self, draft: Draft, folder: Path, restart: Path | None = None) -> None:
-        """Start the program on the case as it is saved; `restart`: the file from which it goes
-        on."""
-        super().__init__(folder)
-        self.log = tempfile.TemporaryFile("w+")  # noqa: SIM115 - as long as the run
-        more = ["--restart", str(restart)] if restart else []
-        words = [str(draft.program), "--quiet", *more, str(draft.case)]
-        # In a session of its own: Ctrl-C ends the page, not the run.
-        self.process = subprocess.Popen(
-            words,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=self.log,
-            env={**program.ENVIRONMENT, **os.environ},
-            start_new_session=True,
-        )
+    process: subprocess.Popen[bytes] | None = None
 
     @property
     def goes_on(self) -> bool:
-        """Does the program live?"""
-        return self.process.poll() is None
+        """Does the program live, or another one that writes to the folder?"""
+        alive = self.process is not None and self.process.poll() is None
+        return alive or self.watched.goes_on
 
-    def parts(self) -> dict[str, Any]:
+    def begin(self, watched: Watched | Ensemble, words: list[str]) -> None:
+        """Start a program that writes to what is watched from now on. Its session is its own:
+        Ctrl-C ends the page, not the run."""
+        self.watched, self.log = watched, tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self.process = subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.log,
+            env={**program.ENVIRONMENT, **os.environ}, start_new_session=True)  # fmt: skip
+
+    def look(self) -> dict[str, Any]:
         """As of any run; what the program said besides."""
-        goes_on, found = self.goes_on, super().parts()
+        goes_on, found = self.goes_on, super().look()
+        if self.process is None:
+            return found
         self.log.seek(0)
         said = self.log.read()[-4000:].strip()
         found["parts"]["log"] = tag("pre", said) if said else markup()
@@ -66,47 +65,34 @@ class Studio:
 
     def __init__(self, draft: Draft) -> None:
         """Of a case that is being edited."""
-        self.draft, self.site = draft, Site()
-        self.watched = Watched(self._folder())  # may go on since another studio was here
-        self.watch = Watch(self.watched)
+        self.draft, self.site, self.threads = draft, Site(), _CORES
+        # They may go on since another studio was here
+        repeats, run = Ensemble(self._repeats()), Watched(self._folder())
+        self.watch = Begun(repeats if repeats.goes_on else run)
         self.watch.add_to(self.site)
         self.site.get("/", self._page)
-        self.site.get("/draft", self._state)
-        self.site.get("/form", self._form)
-        self.site.get("/check", self._check)
         self.site.get("/watch", self._watch)
-        self.site.post("/edit", self._edit)
-        self.site.post("/save", self._save)
-        self.site.post("/run", self._run)
-        self.site.post("/go-on", self._go_on)
+        self.site.get("/draft", partial(self._tell, draft.state))
+        self.site.get("/check", partial(self._tell, draft.look))
+        changes = {"/edit": draft.edit, "/save": lambda _: draft.save(), "/run": self._begin,
+                   "/repeat": self._begin_repeats}  # fmt: skip
+        for path, work in changes.items():
+            self.site.post(path, partial(self._changed, work))
+        self.site.post("/go-on", partial(self._tell, self._continue))
 
     async def _page(self, _: web.Request) -> web.Response:
         return page_answer(frame(self.draft, self.site.head(), await apart(self._known)))
 
     def _known(self) -> bool:
         """Is there a run to watch?"""
-        return self.watched.goes_on or (self.watched.folder / "run.h5").is_file()
+        folder = self.watch.watched.folder
+        return self.watch.goes_on or any((folder / name).is_file() for name in _RESULTS)
 
-    async def _state(self, _: web.Request) -> web.Response:
-        return json_answer(await apart(self.draft.state))
-
-    async def _form(self, _: web.Request) -> web.Response:
-        return json_answer({"form": await apart(form.form, self.draft)})
-
-    async def _check(self, _: web.Request) -> web.Response:
-        return json_answer(await apart(self.draft.look))
-
-    async def _edit(self, request: web.Request) -> web.Response:
-        return await self._changed(request, self.draft.edit)
-
-    async def _save(self, request: web.Request) -> web.Response:
-        return await self._changed(request, lambda _: self.draft.save())
-
-    async def _run(self, request: web.Request) -> web.Response:
-        return await self._changed(request, lambda _: self._begin())
+    async def _tell(self, work: Callable[[], dict[str, Any]], _: web.Request) -> web.Response:
+        return json_answer(await apart(work))
 
     async def _changed(
-        self, request: web.Request, work: Callable[[dict[str, Any]], dict[str, Any] | None]
+        self, work: Callable[[dict[str, Any]], dict[str, Any] | None], request: web.Request
     ) -> web.Response:
         """Work on the text that the page shows; where it is no longer that, the newest one."""
         order = await order_of(request)
@@ -124,49 +110,69 @@ class Studio:
         except (KeyError, TypeError, ValueError, OverflowError) as problem:
             raise web.HTTPBadRequest(reason="this change cannot be made") from problem
 
-    async def _go_on(self, _: web.Request) -> web.Response:
-        await apart(self._continue)
-        return json_answer({"told": "the run goes on"})
-
-    def _begin(self) -> dict[str, Any]:
+    def _begin(self, order: dict[str, Any]) -> dict[str, Any]:
         """Run the case, while the draft is locked: one at a time."""
+        self.threads = int(order.get("threads") or _CORES)
+        self._keep()
+        self._start()
+        return {"told": "the run begins", "open": "/watch"}
+
+    def _begin_repeats(self, order: dict[str, Any]) -> dict[str, Any]:
+        """Run it many times, as `mics-tools ensemble` does."""
+        self._keep()
+        words = ["ensemble", self.draft.case, "--program", self.draft.program,
+                 "--out", self._repeats(), "--runs", int(order["runs"]),
+                 "--jobs", int(order.get("threads") or _CORES)]  # fmt: skip
+        words += ["--spread", float(order["spread"])] if order.get("spread") else []
+        self.watch.begin(Ensemble(self._repeats()), [*MICS_TOOLS, *map(str, words)])
+        return {"told": "the runs begin", "open": "/watch"}
+
+    def _keep(self) -> None:
         self._require_rest()
         if self.draft.look()["problems"]:
             raise BadRun("the program refuses this case: mend what is marked first")
         self.draft.save()
-        self._start(Started(self.draft, self._folder()))
-        return {"told": "the run begins", "open": "/watch"}
 
-    def _continue(self) -> None:
+    def _continue(self) -> dict[str, Any]:
         """The run that was stopped, from its newest restart file."""
         with self.draft.lock:
             self._require_rest()
-            run = self.watched.look()
+            watched = self.watch.watched
+            run = watched.look() if isinstance(watched, Watched) else None
             if run is None or not run.restart_files:
                 raise BadRun("there is no restart file to go on from")
-            self._start(Started(self.draft, run.folder, run.folder / run.restart_files[-1]))
+            self._start("--restart", str(run.folder / run.restart_files[-1]))
+        return {"told": "the run goes on"}
+
+    def _repeats(self) -> Path:
+        """The folder of many runs."""
+        return Path(f"mics-ensemble-{self.draft.case.stem}")
 
     def _folder(self) -> Path:
         """The results of the case as it is saved."""
         with suppress(BadRun):  # it cannot be read
-            return Path(str(settings.value(self.draft.saved, "run", "output") or OUTPUT).strip())
+            return folder_in(self.draft.saved)
         return Path(OUTPUT)
 
     def _require_rest(self) -> None:
-        for watched in (self.watched, Watched(self._folder())):
-            if watched.goes_on:
-                raise BadRun(f"a run goes on in {watched.folder}: stop it first, or wait")
+        others = (Watched(self._folder()), Ensemble(self._repeats()))
+        for one in [self.watch.watched] if self.watch.goes_on else others:
+            if self.watch.goes_on or one.goes_on:
+                raise BadRun(f"a run goes on in {one.folder}: stop it first, or wait")
 
-    def _start(self, started: Started) -> None:
-        self.watched = self.watch.watched = started
+    def _start(self, *more: str) -> None:
+        """The program on the case as it is saved."""
+        words = [str(self.draft.program), "--quiet", "--threads", str(self.threads), *more]
+        self.watch.begin(Watched(self._folder()), [*words, str(self.draft.case)])
 
     async def _watch(self, _: web.Request) -> web.Response:
         if not await apart(self._known):
             raise web.HTTPSeeOther("/")
         back = tag("p", tag("a", "← back to the case", href="/"), class_="note")
-        title = await apart(self.watched.title)
+        watched = self.watch.watched
         go_on = tag("button", "Go on", type="button", id="go-on")
-        return page_answer(watch_page.run_frame(title, self.site.head(), back, go_on))
+        title = await apart(watched.title)
+        return page_answer(watch_page.frame(watched.page, title, self.site.head(), back, go_on))
 
 
 def frame(draft: Draft, head: Markup, known: bool) -> str:
@@ -174,8 +180,12 @@ def frame(draft: Draft, head: Markup, known: bool) -> str:
     label = "the set-up; arrow keys turn it, + and - zoom; in a flat view drag a block to move it"
     content = filled(
         "studio",
+        schema=data("schema", draft.schema),
+        physics=filled("physics"),
         name=draft.case.name,
         watch=tag("a", "the run", href="/watch") if known else None,
+        cores=_CORES,
+        none=Markup("" if draft.ours.is_dir() else "hidden"),
         player=player("player", label, plan=True, hint=_HINT),
     )
     return document(f"{draft.case.name} – mics studio", content, script=_START, more=SCRIPTS,

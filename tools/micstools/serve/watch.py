@@ -1,27 +1,37 @@
 """Watches a run or an ensemble: reads its files at each look, changes nothing but by a button."""
 
 import re
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
-from micstools import command, files
 from micstools.cases import settings
 from micstools.ensembles import ensemble
 from micstools.ensembles.ensemble import Member
-from micstools.pages import ensemble_page, motion, run_page, run_words
-from micstools.piles import options, pile_ensemble
+from micstools.pages import motion, run_words
+from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
 from micstools.serve.server import Site, apart, foreign_answer, json_answer, order_of, page_answer
 
 MOST = 600  # rows of blocks that are read of a run
+MICS_TOOLS = (sys.executable, "-m", "micstools.cli")
+TOOLS = {
+    "/report": ("report",),
+    "/pdf": ("report", "--pdf"),
+    "/places": ("places", "--to", "csv,geojson,dxf"),
+}
+"""What a button asks for: a command, to which the folder is added."""
 
 
 class Watched:
     """A run that may still grow. Looks are one at a time: they share what was read."""
+
+    page = "watch_run"
 
     def __init__(self, folder: Path) -> None:
         """Of a folder that may not be there yet."""
@@ -81,12 +91,19 @@ class Watched:
 class Ensemble:
     """The runs of an ensemble; what is done is read once."""
 
+    page = "watch_ensemble"
+
     def __init__(self, folder: Path) -> None:
         """Of its folder."""
         self.folder = folder
         self.lock = threading.Lock()
         self.done: dict[int, ensemble.State] = {}
         self.watched: dict[int, Watched] = {}
+
+    @property
+    def goes_on(self) -> bool:
+        """Does a command compute its runs?"""
+        return living.holder(self.folder / "ensemble.lock") is not None
 
     def members(self) -> list[Member]:
         """As the table of the ensemble has them."""
@@ -125,6 +142,8 @@ class Ensemble:
 
     def title(self) -> str:
         """Of the case, else the folder."""
+        if not pile_ensemble.is_ensemble(self.folder):
+            return self.folder.resolve().name
         case = str(pile_ensemble.about(self.folder / "ensemble.json")["case"])
         said = str(settings.value(case, "run", "title") or "").strip()
         return said or self.folder.resolve().name
@@ -135,11 +154,13 @@ class Ensemble:
 
     def parts(self) -> dict[str, Any]:
         """What the page shows now, and whether that may change."""
+        if not pile_ensemble.is_ensemble(self.folder):
+            return {"parts": watch_page.waiting(self.folder, ""), "running": False, "key": ""}
         with self.lock:
             states, running = self.states()
             choices = self.choices()
             parts = watch_page.ensemble_parts(states, running, lambda m: choices[m.number])
-            alive = bool(running) or living.holder(self.folder / "ensemble.lock") is not None
+            alive = bool(running) or self.goes_on
             key = " ".join(f"{n}:{s.time}" for n, s in running.items()) + f" {len(self.done)}"
             return {"parts": parts, "running": alive, "key": key}
 
@@ -155,6 +176,14 @@ class Ensemble:
             _, running = self.states()
             results = [m.result for m in self.members() if m.number in running]
         return living.stop_ensemble(self.folder, results)
+
+
+def tool(*words: str) -> str:
+    """What a command of mics-tools tells. Raises BadRun with what it says where it refuses."""
+    done = subprocess.run([*MICS_TOOLS, *words], capture_output=True, text=True)
+    if done.returncode:
+        raise BadRun(done.stderr.strip() or f"{words[0]} ended with {done.returncode}")
+    return (done.stdout + done.stderr).strip()
 
 
 class Watch:
@@ -174,11 +203,16 @@ class Watch:
         site.get("/live", self._parts)
         site.get("/scene", self._scene)
         site.post("/stop", self._stop)
-        site.post("/report", self._make_report)
+        for path in TOOLS:
+            site.post(path, self._use)
         site.get("/report", self._report)
 
+    def look(self) -> dict[str, Any]:
+        """What the page shows now."""
+        return self.watched.parts()
+
     async def _parts(self, _: web.Request) -> web.Response:
-        return json_answer(await apart(self.watched.parts))
+        return json_answer(await apart(self.look))
 
     async def _scene(self, request: web.Request) -> web.Response:
         if isinstance(self.watched, Ensemble):
@@ -197,17 +231,11 @@ class Watch:
         work = living.ask_to_stop if how == "restart" else living.stop_at_once
         return json_answer({"told": work(self.watched.folder)})
 
-    async def _make_report(self, _: web.Request) -> web.Response:
-        await apart(self._write_report)
-        return json_answer({"told": f"{self.report}", "open": "/report"})
-
-    def _write_report(self) -> None:
-        folder = self.watched.folder
-        if isinstance(self.watched, Ensemble):
-            text = ensemble_page.page(pile_ensemble.open_ensemble(folder), options.told(folder))
-        else:
-            text = run_page.page(command.open_run(folder), options.told(folder))
-        files.write(self.report, text)
+    async def _use(self, request: web.Request) -> web.Response:
+        name, *more = TOOLS[request.path]
+        told = await apart(tool, name, str(self.watched.folder), *more)
+        opened = {"open": "/report"} if request.path == "/report" else {}
+        return json_answer({"told": told, **opened})
 
     async def _report(self, _: web.Request) -> web.Response:
         if not self.report.is_file():
@@ -222,9 +250,8 @@ def site_of(folder: Path) -> Site:
     Watch(watched).add_to(site)
 
     async def first(_: web.Request) -> web.Response:
-        if isinstance(watched, Ensemble):
-            return page_answer(watch_page.ensemble_frame(await apart(watched.title), site.head()))
-        return page_answer(watch_page.run_frame(await apart(watched.title), site.head()))
+        title = await apart(watched.title)
+        return page_answer(watch_page.frame(watched.page, title, site.head()))
 
     site.get("/", first)
     return site

@@ -36,25 +36,17 @@ _STEP = (
     ("drift", "liquid_volume_drift", ".1e"),
 )
 _START = "const live = startLive();\n"
-_KEYS = "arrow keys turn it, + and - zoom, space plays"
 Parts = dict[str, Markup]
 
 
-def run_frame(
-    title: str, head: Markup, above: Markup | None = None, more: Markup | None = None
+def frame(
+    page: str, title: str, head: Markup, above: Markup | None = None, go_on: Markup | None = None
 ) -> str:
-    """The page of a run; its parts come later. `above` it and `more` buttons where it is part of
-    something."""
-    stage = player("player", f"the blocks so far; {_KEYS}")
-    content = filled("watch_run", title=title, more=more, player=stage)
+    """The page of a run or an ensemble; its parts come later. `above` it and a button of a run
+    where it is part of something."""
+    label = "the blocks so far; arrow keys turn it, + and - zoom, space plays"
+    content = filled(page, title=title, go_on=go_on, player=player("player", label))
     return document(title, above, content, script=_START, more=SCRIPTS, head=head)
-
-
-def ensemble_frame(title: str, head: Markup) -> str:
-    """The page of an ensemble; its parts come later."""
-    stage = player("player", f"the chosen run so far; {_KEYS}")
-    content = filled("watch_ensemble", title=title, player=stage)
-    return document(title, content, script=_START, more=SCRIPTS, head=head)
 
 
 def bar(share: float, words: str) -> Markup:
@@ -86,7 +78,7 @@ def run_parts(run: Run, found: State) -> Parts:
         way_on = [" It goes on with ", tag("code", f"mics-tools run CASE --restart {newest}"), "."]
     parts = {
         "state": markup(said + ".", *way_on),
-        "bar": bar(found.share, said),
+        "bar": bar(1.0 if found.code == 0 else found.share, said),
         "facts": _facts(run, found),
         "step": table([words for words, _, _ in shown], rows),
     }
