@@ -4,8 +4,9 @@
 !! cell. A cell without solid has C^ = W/Vt. A cut cell takes the value of its row, spread sideways
 !! through open faces, if the plane of that value holds just the liquid of the cell, and else the
 !! share below its own plane. Cells almost or fully solid take the mean of their row. Nothing passes
-!! closed faces. So level water keeps one and the same value in each row, whatever bodies stand in
-!! it.
+!! closed faces but into cells without an open side: full ones, and notches open to the top, whose
+!! value would else be that of the row above. So level water keeps one and the same value in each
+!! row, whatever bodies stand in it.
 module extended_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
@@ -186,27 +187,34 @@ contains
     end do
     left = kept
   contains
-    !> Mean over the neighbours with a value, behind open faces; a full cell looks through its own
-    !! faces. Equal values give just that value.
+    !> Mean over the neighbours with a value, behind open faces, or behind any for a full cell and
+    !! for a notch, all of whose open faces lie across. Equal values give just that value.
     pure function mean_of_neighbours(at) result(mean)
       integer, intent(in) :: at(3)
       real(wp) :: mean
       real(wp) :: first, sum, value
       integer :: d, s, n, nb(3), f(3)
+      logical :: is_open(0:1, 3), through
 
+      do d = 1, 3
+        do s = 0, 1
+          f = at + s*unit_step(:, d)
+          is_open(s, d) = passable(solid%aperture(f(1), f(2), f(3), d))
+        end do
+      end do
+      through = solid%alpha(at(1), at(2), at(3)) >= 1.0_wp
+      if (across > 0) through = through .or. (any(is_open) .and. count(is_open) &
+        == count(is_open(:, across)))
       n = 0
       first = unknown
       sum = 0.0_wp
       do d = 1, 3
         if (d == across) cycle
         do s = 0, 1
-          f = at + s*unit_step(:, d)
           nb = at + (2*s - 1)*unit_step(:, d)
           if (grid%beyond(nb(d), d)) cycle
           value = c(nb(1), nb(2), nb(3))
-          if (value < 0.0_wp) cycle
-          if (solid%alpha(at(1), at(2), at(3)) < 1.0_wp .and. .not. &
-              passable(solid%aperture(f(1), f(2), f(3), d))) cycle
+          if (value < 0.0_wp .or. (.not. through .and. .not. is_open(s, d))) cycle
           if (n == 0) first = value
           n = n + 1
           sum = sum + (value - first)

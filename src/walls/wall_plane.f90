@@ -80,7 +80,7 @@ contains
     pull = 0.0_wp
     do d = 1, 3
       length = link_to_wall(solid, c, d, -nint(sign(1.0_wp, n(d))))
-      if (length <= 0.0_wp) cycle
+      if (length <= 0.0_wp .or. abs(n(d)) < min_normal) cycle   ! or the wall is on neither side
       seen = seen + grid%area(d)*abs(n(d))
       pull = pull + grid%area(d)/(length*grid%h(d))
     end do

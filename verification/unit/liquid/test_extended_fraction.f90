@@ -28,6 +28,7 @@ contains
     call rows('box in the surface')
     call own_plane()
     call sealed_cell()
+    call notch()
   end subroutine test_extended_fraction
 
   !> A box that cuts cells of the surface and holds some of them, in level water.
@@ -78,5 +79,18 @@ contains
     call check('sealed cell', flow%c(5, 4, 5), 0.6_wp, 1.0e-14_wp)
     call check('the full cell beside it has the row', flow%c(4, 4, 5), flow%c(1, 1, 5), 1.0e-14_wp)
   end subroutine sealed_cell
+
+  !> A nearly full cell in the top of the body, open to the gas only: it has the value of its row,
+  !! not that of the row above.
+  subroutine notch()
+    real(wp) :: row
+
+    row = flow%c(1, 1, 5)
+    call start()
+    solid%alpha(5, 4, 5:6) = [0.99_wp, 0.5_wp]
+    solid%aperture(5, 4, 6, 3) = 0.1_wp
+    call extend_fraction(grid, solid, extension, flow)
+    call check('notch', flow%c(5, 4, 5), row, 1.0e-14_wp)
+  end subroutine notch
 
 end module test_extended_fraction_m
