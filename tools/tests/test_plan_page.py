@@ -179,6 +179,9 @@ def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
     browser.run("document.querySelector('.cells').click()")
     browser.settle()
     assert browser.picture() != before
+    browser.run("document.querySelector('[data-line]').click()")
+    (line,) = re.findall(r"line (\d+)", browser.run("document.querySelector('.line').textContent"))
+    assert browser.run("`${getSelection()}`").strip() == CASE.splitlines()[int(line) - 1].strip()
     assert browser.errors == []
     assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
 

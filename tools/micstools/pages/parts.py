@@ -6,7 +6,7 @@ _HINT = (
     "Front, side and top are to scale: drag to measure, with Shift to move. In the corner view "
     "drag to turn. Bed and walls are see-through before a block."
 )
-NORTH_IS_Y = "North is taken as the y direction; mics-tools report --north gives another."
+NORTH_IS_Y = "North is taken as the y direction; --north gives another."
 
 
 def north_note(north: float | None) -> Markup | None:

@@ -123,6 +123,22 @@ class PlanLayer {
   }
 }
 
+// Selects a line of a text, and brings it into sight.
+function chooseLine(text, line) {
+  const range = document.createRange(), [from, to] = ends(text.data, line);
+  range.setStart(text, from);
+  range.setEnd(text, to);
+  getSelection().removeAllRanges();
+  getSelection().addRange(range);
+  scrollBy(0, range.getBoundingClientRect().top - innerHeight / 2);
+}
+
+// Where a line of a text begins and ends.
+function ends(text, line) {
+  const lines = text.split('\n'), from = lines.slice(0, line - 1).reduce((sum, words) => sum + words.length + 1, 0);
+  return [from, from + lines[line - 1].length];
+}
+
 // A player of a set-up, with the buttons of its page.
 function startPlan(root) {
   const player = startPlayer(root);
@@ -133,6 +149,8 @@ function startPlan(root) {
   document.addEventListener('click', event => {
     const asked = event.target.closest('[data-mark]');
     if (asked) player.plan.ask(+asked.dataset.mark);
+    const line = event.target.closest('[data-line]'), text = document.querySelector('#case pre');
+    if (line && text) chooseLine(text.firstChild, +line.dataset.line);
   });
   return player;
 }

@@ -107,7 +107,13 @@ def _warnings(found: SetUp) -> Markup | None:
             tag("button", str(n), type="button", data_mark=n, aria_label=f"show where: {w.text}")
             if n in marked
             else tag("b", str(n)),
-            tag("span", w.text, w.place),
+            tag(
+                "span",
+                w.text,
+                tag("button", w.place, type="button", class_="line", data_line=w.line)
+                if w.line
+                else w.place,
+            ),
         )
         for n, w in enumerate(found.warnings, 1)
     ]

@@ -194,7 +194,7 @@ class Studio {
       button.setAttribute('aria-label', `go to: ${text}`);
       button.addEventListener('click', () => (field || place || this.text).scrollIntoView({ block: 'center' }) || (field && field.focus()));
       const words = document.createElement('span');
-      words.textContent = `${text} `;
+      words.textContent = text;
       if (line || group) {
         const there = document.createElement('button');
         Object.assign(there, { type: 'button', className: 'line', textContent: `line ${this.lineOf(group, variable, line)}` });
@@ -218,6 +218,7 @@ class Studio {
     if (copy) await this.edit({ op: 'copy', group: copy, n: +n });
     if (remove) await this.edit({ op: 'remove', group: remove, n: +n });
     if (show) this.show(show);
+    if (button.dataset.line) this.goTo(+button.dataset.line);
     if (button.id === 'undo') await this.edit({ op: 'undo' });
     if (['save', 'run', 'repeat'].includes(button.id)) await this.order(button.id);
     if (button.id === 'repeats') document.getElementById('many').showModal();
@@ -242,10 +243,10 @@ class Studio {
   // Shows a line of the text.
   goTo(line) {
     this.show('text');
-    const { text } = this, lines = text.value.split('\n'), start = lines.slice(0, line - 1).join('\n').length + (line > 1);
+    const { text } = this;
     text.focus();
-    text.setSelectionRange(start, start + lines[line - 1].length);
-    text.scrollTop = (line - 1) / lines.length * text.scrollHeight - text.clientHeight / 2;
+    text.setSelectionRange(...ends(text.value, line));
+    text.scrollTop = (line - 1) / text.value.split('\n').length * text.scrollHeight - text.clientHeight / 2;
     text.scrollIntoView({ block: 'nearest' });
   }
 
