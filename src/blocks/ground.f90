@@ -29,6 +29,7 @@ module ground_m
   type :: lower_side_t
     real(wp) :: ball = 0.0_wp, radius = 0.0_wp   !! of the ball, of the bounding sphere [m]
     real(wp), allocatable :: face(:, :, :)       !! (3, 3, n) [m]
+    real(wp), allocatable :: low(:, :), high(:, :)   !! (3, n) corners of the boxes around these [m]
     type(bins_t) :: bins
   end type lower_side_t
 
@@ -135,7 +136,6 @@ contains
     type(solid_t), intent(in) :: solid
     real(wp), intent(in) :: turn(3, 3)   !! body to space
     type(lower_side_t), intent(out) :: own
-    real(wp), allocatable :: low(:, :), high(:, :)
     real(wp) :: face(3, 3)
     integer :: f, n
 
@@ -152,12 +152,12 @@ contains
       own%face(1:2, :, n) = (1.0_wp - side_share)*face(1:2, :)
     end do
     own%face = own%face(:, :, :n)
-    allocate (low(3, n), high(3, n), source=0.0_wp)
-    do f = 1, n
-      low(1:2, f) = minval(own%face(1:2, :, f), 2)
-      high(1:2, f) = maxval(own%face(1:2, :, f), 2)
-    end do
-    call bins_build(low, high, own%radius/sqrt(real(max(1, n), wp)), own%bins)
+    own%low = minval(own%face, 2)
+    own%high = maxval(own%face, 2)
+    own%low(3, :) = 0.0_wp   ! bins are columns
+    own%high(3, :) = 0.0_wp
+    call bins_build(own%low, own%high, own%radius/sqrt(real(max(1, n), wp)), own%bins)
+    own%low(3, :) = minval(own%face(3, :, :), 1)
   end subroutine set_lower_side
 
   !> Vertical component of the unit normal of a triangle; 0 for none [-].
@@ -236,29 +236,28 @@ contains
     real(wp), intent(in) :: face(3, 3)   !! [m]
     real(wp), intent(in) :: least
     real(wp), intent(inout) :: gap
-    integer :: a(3), b(3), i, j, m, bin
-    real(wp) :: low(2), high(2)
+    integer :: a(3), b(3), i, j, m, bin, f
+    real(wp) :: low(2), high(3)
 
-    low = minval(face(1:2, :), 2)
-    high = maxval(face(1:2, :), 2)
-    if (any(low > own%radius) .or. any(high < -own%radius)) return
-    if (-own%radius - maxval(face(3, :)) >= gap) return
+    low = min(face(1:2, 1), face(1:2, 2), face(1:2, 3))
+    high = max(face(:, 1), face(:, 2), face(:, 3))
+    if (any(low > own%radius) .or. any(high(1:2) < -own%radius)) return
+    if (-own%radius - high(3) >= gap) return
     if (own%ball > 0.0_wp) then
       call lower_ball(own%ball, [0.0_wp, 0.0_wp, 0.0_wp], face, least, gap)
       return
     end if
     associate (bins => own%bins)
       a = bins%place([low, 0.0_wp])
-      b = bins%place([high, 0.0_wp])
+      b = bins%place([high(1:2), 0.0_wp])
       do j = a(2), b(2)
         do i = a(1), b(1)
           bin = bins%number([i, j, 1])
           do m = bins%first(bin), bins%first(bin + 1) - 1
-            associate (lower => own%face(:, :, bins%item(m)))
-              if (any(minval(lower(1:2, :), 2) > high) .or. &
-                any(maxval(lower(1:2, :), 2) < low)) cycle
-              call compare(lower, face, least, gap)
-            end associate
+            f = bins%item(m)
+            if (any(own%low(1:2, f) > high(1:2)) .or. any(own%high(1:2, f) < low)) cycle
+            if (own%low(3, f) - high(3) > gap + side_share*own%radius) cycle   ! round-off apart
+            call compare(own%face(:, :, f), face, least, gap)
           end do
         end do
       end do

@@ -29,6 +29,9 @@ module overlap_m
     type(solid_t), allocatable :: solid(:)
     type(pair_list_t) :: pairs
     type(found_t) :: found                       !! work
+    real(wp), allocatable :: at(:, :)            !! (7, n) where `in_bed` was found
+    real(wp), allocatable :: in_bed(:, :)
+      !! (2, n) depth of interest and depth in the bed, if that is larger [m]
   end type overlap_t
 
 contains
@@ -155,6 +158,10 @@ contains
     if (.not. any(deep%asked)) return
     asked = deep%asked .and. blocks%present
     allocate (turn(3, 3, blocks%n))
+    if (.not. allocated(overlap%at)) then
+      allocate (overlap%at(7, blocks%n), source=huge(1.0_wp))
+      allocate (overlap%in_bed(2, blocks%n), source=0.0_wp)
+    end if
     radius = 0.0_wp
     do a = 1, blocks%n
       if (.not. asked(a)) cycle
@@ -165,8 +172,7 @@ contains
         deepest = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           turn(:, :, a), walls, deepest)
-        if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), turn(:, :, a), &
-          walls%bed, overlap%found, deepest)
+        if (walls%bed%there) call deepen_bed_once(a, deepest)
         call store_overlap(a, wall, deepest, deep)
         depth = max(depth, deepest)
       end associate
@@ -183,6 +189,27 @@ contains
       call store_overlap(a, b, deepest, deep)
       depth = max(depth, deepest)
     end do
+  contains
+    !> The same as `deepen_bed`; of a body that has not moved since, what was found.
+    subroutine deepen_bed_once(a, depth)
+      integer, intent(in) :: a
+      real(wp), intent(inout) :: depth
+      real(wp) :: here(7)
+
+      here = [blocks%x(:, a), blocks%q(:, a)]
+      associate (least => overlap%in_bed(1, a), known => overlap%in_bed(2, a))
+        if (any(abs(overlap%at(:, a) - here) > 0.0_wp) &
+            .or. (depth < least .and. known <= least)) then
+          overlap%at(:, a) = here
+          least = depth
+          call deepen_bed(overlap%solid(blocks%shape(a)), blocks%x(:, a), turn(:, :, a), &
+            walls%bed, overlap%found, depth)
+          known = depth
+        else if (known > least) then
+          depth = max(depth, known)
+        end if
+      end associate
+    end subroutine deepen_bed_once
   end subroutine max_overlap
 
   !> Depth below which that of a body and its counterpart is of no interest: neither the largest of
