@@ -95,6 +95,28 @@ def test_other_shapes_are_refused(filled: Path) -> None:
     assert done.returncode == 2 and "shapes must be the same" in done.stderr, done.stderr
 
 
+def test_one_cause_is_one_message(filled: Path, tmp_path: Path) -> None:
+    """Of stones of a family, which are shapes of their own, and of blocks beyond a wall."""
+    rocks = "&shape name = 'rock'  kind = 'rock'  density = 2650  mass_50 = {} {} /\n"
+    sizes = "mass_min = 0.001  mass_max = 0.003  variants = 6"
+    drop = "&drop shape = 'rock'  position = 0.06, 0.04, 0.06  to = 0.18, 0.04, 0.06  count = 6 /\n"
+    fill = FILL.replace("0.5", "0.02") + GRID + rocks.format(0.002, sizes) + drop
+    assert mics(tmp_path, fill.replace("count = 6", "count = 6  interval = 0")).returncode == 0
+    with h5py.File(tmp_path / "fill/run.h5") as h5:
+        shapes = len(set(h5["bodies/shape"][:]))
+    start = "&start file = 'fill/run.h5' /\n"
+    for shape, words in (
+        (rocks.format(0.0021, sizes), "shapes must be the same"),
+        (CUBE, "which no &shape here has"),
+    ):
+        done = mics(tmp_path, THEN + GRID + start + shape)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+        assert words in done.stderr and f"(likewise {shapes - 1} more shapes)" in done.stderr
+    done = mics(filled, THEN + GRID + CUBE + start.replace("/\n", "shift = 0.3, 0, 0 /\n"))
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert "&start: position = " in done.stderr and "(likewise 2 more blocks)" in done.stderr
+
+
 HINGE, HEIGHT, LONG = 0.15, 0.40, 0.23
 """Half the width of the hopper between its hinges, their height, length of its halves [m]."""
 HOPPER = """&grid cells = 25, 8, 30  length = 0.5, 0.16, 0.6 /

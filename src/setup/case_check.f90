@@ -78,8 +78,8 @@ contains
     type(problems_t), intent(inout) :: problems
     type(scene_t) :: scene
     type(case_t) :: known   ! the case without the sides that are wrong
-    character(:), allocatable :: where_to
-    integer :: b, i, n
+    character(:), allocatable :: where_to, first
+    integer :: b, i, n, n_begun   ! outside
 
     known = with_begun(case)
     where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
@@ -87,13 +87,22 @@ contains
     if (.not. case%grid%extent_faulty) call check_lengths(known, shapes, problems)
     call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
+    n_begun = 0
     do b = 1, merge(0, scene%n_bodies, case%grid%extent_faulty)   ! inside the tank?
       where_to = way_out(known, scene, b)
       scene%outside(b) = len(where_to) > 0
-      if (scene%outside(b)) call problems%add_message('&body position = ' &
-        //to_text(scene%blocks%x(:, b))//': '//where_to//'; a body must lie inside the tank', &
-        scene%line(b))
+      if (.not. scene%outside(b)) cycle
+      where_to = 'position = '//to_text(scene%blocks%x(:, b))//': '//where_to &
+        //'; a body must lie inside the tank'
+      if (scene%line(b) == case%start%line) then   ! one cause for all of them
+        n_begun = n_begun + 1
+        if (n_begun == 1) first = where_to
+      else
+        call problems%add_message('&body '//where_to, scene%line(b))
+      end if
     end do
+    if (n_begun > 1) first = first//' (likewise '//to_text(n_begun - 1)//' more blocks)'
+    if (n_begun > 0) call problems%add_message('&start: '//first, case%start%line)
     n = problems%n
     call check_pairs(known, scene, problems)
     if (problems%n == n .and. .not. case%grid%extent_faulty) call check_ways(known, scene, problems)

@@ -151,7 +151,10 @@ contains
     integer :: form(left%n), number(left%n)   ! of each there: shape, among the free ones of it
     integer, allocatable :: number_here(:)
     integer :: i, k, s, n_there, n_here, last
+    integer :: n_alike(3)                      ! faults of a kind
+    character(2*name_length + 120) :: first(3)   ! of them
 
+    n_alike = 0
     call blocks_init(case, shapes, blocks)
     form = [(findloc(shapes%name == left%shape(i), .true., 1), i=1, left%n)]
     number = [(count(free(:i) .and. form(:i) == form(i)), i=1, left%n)]
@@ -166,23 +169,23 @@ contains
       n_there = count(taken .and. left%shape == left%shape(i))
       s = form(i)
       if (s == 0) then
-        call report(case, 'has '//to_text(n_there)//' free blocks of the shape ' &
-          //quoted_text(trim(left%shape(i)))//', which no &shape here has', problems)
+        call differs(1, 'has '//to_text(n_there)//' free blocks of the shape ' &
+          //quoted_text(trim(left%shape(i)))//', which no &shape here has')
         cycle
       end if
       if (abs(mass(i) - shapes(s)%density*shapes(s)%volume) > same_mass*mass(i)) then
-        call report(case, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
+        call differs(2, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
           //to_text(mass(i))//' kg there and '//to_text(shapes(s)%density*shapes(s)%volume) &
-          //' kg here; shapes must be the same', problems)
+          //' kg here; shapes must be the same')
         cycle
       end if
       n_here = count(blocks%shape == s .and. .not. blocks%fixed)
       if (n_here == 0) cycle   ! they come along
       last = maxval(number, taken .and. form == s)
       if (last > n_here) then
-        call report(case, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
+        call differs(3, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
           //' up to number '//to_text(last)//', this case names '//to_text(n_here) &
-          //'; name as many, or none and they come along', problems)
+          //'; name as many, or none and they come along')
         cycle
       end if
       do k = 1, left%n   ! the k-th free block of a shape there is the k-th here
@@ -190,10 +193,25 @@ contains
           blocks%fixed .and. number_here == number(k), .true., 1)
       end do
     end do
+    do k = 1, size(first)
+      if (n_alike(k) > 1) first(k) = trim(first(k))//' (likewise '//to_text(n_alike(k) - 1) &
+        //' more shapes)'
+      if (n_alike(k) > 0) call report(case, trim(first(k)), problems)
+    end do
     if (problems%n > 0) return
     call bring_along(case, left, taken .and. here == 0)
     call keep(case%begun)
   contains
+    !> Note a fault of a shape. Of a kind the first is reported, with the number of the others: the
+    !! stones of a family have one cause.
+    subroutine differs(kind, what)
+      integer, intent(in) :: kind
+      character(*), intent(in) :: what
+
+      n_alike(kind) = n_alike(kind) + 1
+      if (n_alike(kind) == 1) first(kind) = what
+    end subroutine differs
+
     !> Remember the blocks that the case names, by drop and number.
     subroutine keep(begun)
       type(begun_t), intent(inout) :: begun
