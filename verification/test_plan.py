@@ -1,10 +1,12 @@
 """What `--check` foresees: levels, volumes, and warnings set apart at the end."""
 
 import re
+import resource
 from pathlib import Path
 
 import pytest
 
+from micstools.cases.program import case_text
 from micstools.reading.reader import Run
 from run_cases import ROOT
 from test_input import mics
@@ -48,6 +50,21 @@ def test_contact_is_solved_as_the_model_asks(tmp_path: Path) -> None:
         assert f"{step} step" in mics(["--check"], tmp_path, f"{case}&contact {model} /\n").stdout
     idle = mics(["--check"], tmp_path, case + "&contact substep_ratio = 0.1 /\n").stdout
     assert "&contact substep_ratio: has no meaning with solver = 'impulses', passed over" in idle
+
+
+@pytest.mark.cost(5)
+@pytest.mark.parametrize(("case", "t_end"), [("crane", 60), ("roundhead", 60), ("blocks", 10)])
+def test_the_time_of_a_light_run(case: str, t_end: float, tmp_path: Path) -> None:
+    """It takes between the told time over 2.5 and 2.5 times that, on one core."""
+    text = case_text(ROOT / "input" / f"{case}.nml", ["run.physics=light", f"run.t_end={t_end}"])
+    (tmp_path / "input").symlink_to(ROOT / "input")
+    plan = mics(["--check"], tmp_path, text).stdout
+    told, unit = re.findall(r"time of the run +about ([\d.]+) (s|minutes)", plan)[0]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    mics(["--quiet", "--threads", "1"], tmp_path, text)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    assert 1 / 2.5 < took / (float(told) * (60 if unit == "minutes" else 1)) < 2.5
 
 
 @pytest.mark.parametrize("physics", ["dry", "fluid"])

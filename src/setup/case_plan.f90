@@ -21,6 +21,7 @@ module case_plan_m
   use memory_plan_m, only: planned_memory, size_text
   use value_text_m, only: fixed_text
   use bed_measure_m, only: bed_volume
+  use overlap_solid_m, only: expected_samples
   use panel_method_m, only: added_inertia_t
   use light_m, only: added_inertia_of
   use surface_features_m, only: surface_init
@@ -34,8 +35,11 @@ module case_plan_m
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
-  real(wp), parameter :: seconds_per_substep = 1.5e-5_wp   !! of a block that is awake [s]
+  real(wp), parameter :: seconds_per_substep = 1.0e-5_wp   !! of a block that is awake [s]
+  real(wp), parameter :: seconds_per_row = 4.0e-4_wp       !! of results [s]
+  real(wp), parameter :: seconds_per_sample = 1.6e-7_wp    !! of a shape, held against the bed [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
+  real(wp), parameter :: way_of_step = 0.1_wp   !! of a block that falls, over its smallest edge [-]
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
   real(wp), parameter :: share_shaken = 0.035_wp
     !! of the time until the last release in which landing blocks keep one awake that lies [-]
@@ -75,7 +79,7 @@ contains
     if (case%run%physics /= 'dry') call print_liquid(case, bed)
     if (with_blocks) call print_shapes(case, shapes, n_points)
     if (with_blocks) call print_bodies(case, blocks, bed)
-    call print_steps(case, blocks, d_s, wet)
+    call print_steps(case, blocks, bed, d_s, wet)
     call print_memory(case, shapes, bed)
     call print_files(case, wet)
   end subroutine print_plan
@@ -303,9 +307,10 @@ contains
   end subroutine print_rise
 
   !> What limits the steps of the fluid and of the bodies.
-  subroutine print_steps(case, blocks, d_s, wet)
+  subroutine print_steps(case, blocks, bed, d_s, wet)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     logical, intent(in) :: wet
     real(wp) :: h, limit
@@ -313,7 +318,7 @@ contains
     call heading('Time steps')
     call entry('largest', brief(case%run%dt)//' s, at least ' &
                //count_text(max(1.0_wp, case%run%t_end/case%run%dt))//' steps')
-    call entry('time of the run', 'about '//time_text(wet, case, blocks) &
+    call entry('time of the run', 'about '//time_text(wet, case, blocks, bed) &
                //' or more on one core')
     h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
@@ -337,36 +342,21 @@ contains
       case, blocks%shapes, d_s)
   end subroutine print_steps
 
-  !> Time for the fewest steps that the run can take with a flow; without one for the substeps of
-  !! the blocks that are awake.
-  function time_text(wet, case, blocks) result(text)
+  !> Time for the fewest steps that the run can take.
+  function time_text(wet, case, blocks, bed) result(text)
     logical, intent(in) :: wet
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     character(:), allocatable :: text
-    real(wp) :: seconds, awake, g
-    integer :: b, n
+    real(wp) :: seconds
 
     if (wet) then
       seconds = seconds_per_block*real(blocks%n, wp) &
         + seconds_per_cell*product(real(case%grid%cells, wp))
       seconds = seconds*case%run%t_end/case%run%dt
-    else   ! times for which the blocks are awake, all together
-      g = norm(case%fluid%gravity)
-      n = size(case%body)
-      seconds = 0.0_wp
-      do b = 1, blocks%n
-        if (b <= n .and. blocks%fixed(b)) cycle
-        awake = max(case%run%t_end - blocks%release_time(b), 0.0_wp)
-        if (case%contact%sleep .and. g > 0.0_wp) awake = min(awake, &
-          time_awake*sqrt(cube_root(blocks%shapes(blocks%shape(b))%volume)/g))
-        seconds = seconds + awake
-      end do
-      associate (time => min(blocks%release_time(n + 1:), case%run%t_end))   ! of the drops
-        if (case%contact%sleep .and. size(time) > 0) seconds = seconds &
-          + share_shaken*sum(maxval(time) - time)
-      end associate
-      seconds = seconds_per_substep*seconds*substeps_per_contact/case%contact%contact_time
+    else
+      seconds = seconds_without_flow(case, blocks, bed)
     end if
     if (seconds < 100.0_wp) then
       text = brief(seconds, 2)//' s'
@@ -376,6 +366,59 @@ contains
       text = brief(seconds/3600.0_wp, 2)//' hours'
     end if
   end function time_text
+
+  !> Time for the substeps of the blocks that are awake, while they come down and until they lie
+  !! still; for the rows of results; and for the depth of these blocks in the bed, in each row [s].
+  function seconds_without_flow(case, blocks, bed) result(seconds)
+    type(case_t), intent(in) :: case
+    type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
+    real(wp) :: seconds
+    real(wp) :: samples(size(blocks%shapes))
+    real(wp) :: g, low, size_of, speed, step, row, fall, moves   ! step, row: times between rows [s]
+    real(wp) :: awake, rows, looks   ! of all blocks: time [s], rows, points held against the bed
+    integer :: b, n, s
+
+    g = norm(case%fluid%gravity)
+    low = case%grid%origin(3)
+    samples = 0.0_wp
+    if (bed%there) then
+      low = max(low, sum(bed%point(3, :))/real(size(bed%point, 2), wp))
+      samples = [(expected_samples(blocks%shapes(s)), s=1, size(samples))]
+    end if
+    n = size(case%body)
+    row = max(case%run%dt, case%run%history_interval)
+    rows = case%run%t_end/row
+    awake = 0.0_wp
+    looks = 0.0_wp
+    do b = 1, blocks%n
+      if (b <= n .and. blocks%fixed(b)) cycle
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        size_of = cube_root(shape%volume)
+        speed = sqrt(g*size_of)   ! about that of a long fall
+        step = row
+        if (case%run%physics == 'light' .and. speed > 0.0_wp) step = max( &
+          case%run%history_interval, min(case%run%dt, way_of_step*shape%smallest_edge/speed))
+        if (blocks%handling(b)%lowering_speed > 0.0_wp) then
+          speed = blocks%handling(b)%lowering_speed
+          step = row
+        end if
+      end associate
+      moves = max(case%run%t_end - blocks%release_time(b), 0.0_wp)
+      fall = min(moves, max(blocks%x(3, b) - low, 0.0_wp)/max(speed, tiny(speed)))
+      moves = moves - fall
+      if (case%contact%sleep .and. g > 0.0_wp) moves = min(moves, time_awake*sqrt(size_of/g))
+      awake = awake + fall + moves
+      rows = rows + fall*(1.0_wp/step - 1.0_wp/row)
+      looks = looks + samples(blocks%shape(b))*(fall/step + moves/row)
+    end do
+    associate (time => min(blocks%release_time(n + 1:), case%run%t_end))   ! of the drops
+      if (case%contact%sleep .and. size(time) > 0) awake = awake &
+        + share_shaken*sum(maxval(time) - time)
+    end associate
+    seconds = seconds_per_substep*awake*substeps_per_contact/case%contact%contact_time &
+      + seconds_per_row*rows + seconds_per_sample*looks
+  end function seconds_without_flow
 
   !> Limits of the body steps and, with springs, how far the shapes give way.
   subroutine print_body_steps(case, shapes, d_s)
