@@ -14,19 +14,10 @@ SEARCHED = ("", "docs/", "src/", "verification/", "tools/")
 
 
 WRITTEN = {
-    "bench.json",
-    "build/bench.json",
-    "ensemble.csv",
-    "ensemble.json",
-    "handover.json",
-    "mics-roundhead/handover.json",
-    "mics-paper-ensemble/shares.md",
-    "landings.csv",
-    "pile.csv",
-    "pile.json",
-    "places.csv",
-    "places.json",
-}
+    "bench.json", "build/bench.json", "ensemble.csv", "ensemble.json", "handover.json",
+    "mics-roundhead/handover.json", "mics-paper-ensemble/shares.md", "landings.csv", "pile.csv",
+    "pile.json", "places.csv", "places.json",
+}  # fmt: skip
 """Files that the tools write, which texts name."""
 
 

@@ -11,24 +11,10 @@ from worlds.__main__ import LAWS, judge
 
 FAILED = tomllib.loads((Path(__file__).parent / "worlds" / "failed.toml").read_text())
 SEEDS = {
-    "still": 30,
-    "lying": 8,
-    "balance": 12,
-    "restart": 4,
-    "machine": 2,
-    "froude": 10,
-    "looks": 2,
-    "order": 2,
-    "tool": 1,
-    "drops": 2,
-    "units": 2,
-    "moved": 2,
-    "bodies": 3,
-    "momentum": 3,
-    "mirror": 2,
-    "turn": 3,
-    "axes": 3,
-}
+    "still": 30, "lying": 8, "balance": 12, "restart": 4, "machine": 2, "froude": 10, "looks": 2,
+    "order": 2, "tool": 1, "drops": 2, "units": 2, "moved": 2, "bodies": 3, "momentum": 3,
+    "mirror": 2, "turn": 3, "axes": 3,
+}  # fmt: skip
 WORLDS = [(law, seed) for law, n in SEEDS.items() for seed in range(1, n + 1)]
 WORLDS += [(row["law"], row["seed"]) for row in FAILED.get("failed", [])]
 KNOWN = {

@@ -69,16 +69,8 @@ def test_boxes_that_fill_space_hold_the_whole_and_agree_with_planes() -> None:
     shape = hexapod(0.02)
     corner = g.place(shape.points, np.zeros(3), TILTED)[shape.tets]
     cuts = np.array([-np.inf, -0.011, 0.004, np.inf])
-    parts = np.array(
-        [
-            [
-                g.volume_in_box(corner, cuts[[i, j, k]], cuts[[i + 1, j + 1, k + 1]])
-                for k in range(3)
-            ]
-            for i in range(3)
-            for j in range(3)
-        ]
-    )
+    cells = np.array(list(np.ndindex(3, 3, 3)))
+    parts = np.array([g.volume_in_box(corner, cuts[c], cuts[c + 1]) for c in cells]).reshape(9, 3)
     below = g.below_plane(corner, -0.011)[0]
     assert parts.sum() == pytest.approx(shape.volume, rel=1e-13)
     assert parts[:, 0].sum() == pytest.approx(below, rel=1e-13)

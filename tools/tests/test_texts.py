@@ -234,19 +234,14 @@ ROW = re.compile(r"^\| `([\w/]+\.f90)` `(\w+)` \| `([^`]+)` \|(.*)\|$", re.MULTI
 NO_CONSTANTS = {
     "base/kinds.f90": {"pi"},
     # what follows from geometry alone
-    "shapes/armour_units.f90": {"cosine", "sine"},
-    "shapes/shapes_builtin.f90": {"golden"},
+    "shapes/armour_units.f90": {"cosine", "sine"}, "shapes/shapes_builtin.f90": {"golden"},
     "shapes/contact_sphere_placement.f90": {"turn"},
-    # a ratio of two constants of the page
     # marks for "none"
-    "shapes/surface_search.f90": {"nowhere"},
-    "case/case_types.f90": {"absent"},
-    "liquid/extended_fraction.f90": {"unknown"},
-    "liquid/liquid_fill.f90": {"no_surface"},
-    "grid/outflow.f90": {"elsewhere"},
-    "coupling/voxels.f90": {"no_hit"},
+    "shapes/surface_search.f90": {"nowhere"}, "case/case_types.f90": {"absent"},
+    "liquid/extended_fraction.f90": {"unknown"}, "liquid/liquid_fill.f90": {"no_surface"},
+    "grid/outflow.f90": {"elsewhere"}, "coupling/voxels.f90": {"no_hit"},
     "momentum/surface_heights.f90": {"no_height"},
-}
+}  # fmt: skip
 
 
 def declared(text: str) -> dict[str, str]:

@@ -40,15 +40,10 @@ def prosperetti_two_fluids(
     """
     beta = densities[0] * densities[1] / (densities[0] + densities[1]) ** 2
     rate = viscosity * wavenumber**2
-    roots = np.roots(
-        [
-            1.0,
-            -4.0 * beta * rate**0.5,
-            2.0 * (1.0 - 6.0 * beta) * rate,
-            4.0 * (1.0 - 3.0 * beta) * rate**1.5,
-            (1.0 - 4.0 * beta) * rate**2 + omega**2,
-        ]
-    )
+    roots = np.roots([
+        1.0, -4.0 * beta * rate**0.5, 2.0 * (1.0 - 6.0 * beta) * rate,
+        4.0 * (1.0 - 3.0 * beta) * rate**1.5, (1.0 - 4.0 * beta) * rate**2 + omega**2,
+    ])  # fmt: skip
     root_t = np.sqrt(time)
     steady = 4.0 * (1.0 - 4.0 * beta) * rate**2 / (8.0 * (1.0 - 4.0 * beta) * rate**2 + omega**2)
     total = steady * np.exp(-rate * time) * _faddeeva(1j * np.sqrt(rate) * root_t)
