@@ -75,6 +75,8 @@ def test_order_and_error_of_a_known_law(order: float, grids: tuple[float, ...]) 
 def test_what_does_not_converge_says_so(words: str, values: list[float]) -> None:
     found = converge((1, 2, 4), values)
     assert words in found.words and np.isnan(found.order)
+    spread = np.ptp(values) if len(values) == 3 else np.nan
+    assert found.range == pytest.approx(spread, nan_ok=True)
 
 
 @pytest.mark.parametrize("words", TABLES["equal"])

@@ -11,6 +11,7 @@ import pytest
 from calls import mics_tools
 from micstools.piles import layer, maps, pile_form, pile_numbers
 from micstools.piles.maps import height_map
+from micstools.reading import block_numbers
 from micstools.reading.overlap import Placed, find_contacts, present_bodies, sphere_gap
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
@@ -109,6 +110,15 @@ def test_height_map_of_a_cube_and_a_tilted_one() -> None:
     assert both[50, seen] == pytest.approx(roof[seen])
 
 
+def test_terminal_speed() -> None:
+    """Of v = 2 tanh(t/0.5), once it has settled; none of its first half second."""
+    time = np.linspace(0, 10, 201)
+    height = 20 - np.log(np.cosh(time / 0.5))
+    assert block_numbers.terminal_speed(time, height, 1.0) == pytest.approx(2.0, rel=1e-3)
+    assert np.isnan(block_numbers.terminal_speed(time[:11], height[:11], 0.1))
+    assert np.isnan(block_numbers.terminal_speed(time, height, 20.0))
+
+
 def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     """One cube beside the three fixed ones: four outlines, and its top in the map."""
     run = make_run(cubes((0.03, 0.03, 0.05)))
@@ -116,6 +126,7 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     content = json.loads((run.folder / "pile.json").read_text())
     assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
         "time_to_rest": "s", "fall_time": "s", "fall_speed": "m/s", "fall_drift": "m",
+        "terminal_speed": "m/s",
         "impact_speed": "m/s", "contact_force": "N", "peak_force": "N", "slopes": "deg",
         "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
         "footprint": "m2"}  # fmt: skip

@@ -21,6 +21,7 @@ class Convergence:
     limit: float  # the value on endlessly fine cells
     error: float  # of the value on the finest grid: value - limit
     words: str  # why there is no order, or none is needed; empty where there is one
+    range: float = float("nan")  # of the values on the three finest grids, where no order is found
 
 
 def converge(fineness: Sequence[float], values: Sequence[float]) -> Convergence:
@@ -35,10 +36,10 @@ def converge(fineness: Sequence[float], values: Sequence[float]) -> Convergence:
     if _equal([b, c]):
         return _converged("the two finest grids", c)
     if (a - b) * (b - c) <= 0:
-        return _nothing("not monotone")
+        return _nothing("not monotone", float(np.ptp([a, b, c])))
     order = _order(f, (a - b) / (b - c))
     if order != order:
-        return _nothing("no order fits")
+        return _nothing("no order fits", float(np.ptp([a, b, c])))
     steps = [value**-order for value in f]
     error = (b - c) * steps[2] / (steps[1] - steps[2])
     return Convergence(order, c - error, error, "")
@@ -53,8 +54,8 @@ def _converged(grids: str, value: float) -> Convergence:
     return Convergence(float("nan"), value, 0.0, f"converged: equal on {grids}")
 
 
-def _nothing(words: str) -> Convergence:
-    return Convergence(float("nan"), float("nan"), float("nan"), words)
+def _nothing(words: str, spread: float = float("nan")) -> Convergence:
+    return Convergence(float("nan"), float("nan"), float("nan"), words, spread)
 
 
 def _order(f: list[float], ratio: float) -> float:

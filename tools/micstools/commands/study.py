@@ -99,7 +99,8 @@ def _tell(
 
 def _words(told: Convergence, unit: Unit) -> str:
     if told.words:
-        return f"({told.words})"
+        found = f", range {unit.text(told.range, 2)}" if told.range == told.range else ""
+        return f"({told.words}{found})"
     limit, error = unit.text(told.limit, 5), unit.text(told.error, 2)
     sign = "+" if told.error > 0 else ""
     return f"order {told.order:.2f}, limit {limit}, error {sign}{error}"

@@ -30,6 +30,7 @@ class PileNumbers:
     time_to_rest: float  # [s]; nan where the blocks still move
     fall_time: float  # of the first block that is let go, until it touches something [s]
     fall_speed: float  # its largest speed until then [m/s]
+    terminal_speed: float  # its speed once that has settled; nan of a short fall [m/s]
     fall_drift: float  # its way until then, seen from above [m]
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
     contact_force: float  # largest on a dropped block, a mean over a step [N]
@@ -51,6 +52,7 @@ class PileNumbers:
 KINDS = {
     "plan_area": "area", "top": "place", "centre": "place", "spread": "length",
     "time_to_rest": "time", "fall_time": "time", "fall_speed": "speed", "fall_drift": "length",
+    "terminal_speed": "speed",
     "impact_speed": "speed", "contact_force": "force",
     "peak_force": "force", "slopes": "angle", "box": "place", "height": "length",
     "layer_thickness": "length", "footprint": "area", "thickness_ball": "length",
@@ -123,6 +125,7 @@ def numbers(
         time_to_rest=time_to_rest(run),
         fall_time=struck[0].fall_time if struck else float("nan"),
         fall_speed=struck[0].fastest if struck else float("nan"),
+        terminal_speed=struck[0].terminal if struck else float("nan"),
         fall_drift=struck[0].drift if struck else float("nan"),
         impact_speed=impact_speed(run),
         contact_force=max((k.contact_force for k in struck), default=float("nan")),

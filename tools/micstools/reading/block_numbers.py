@@ -6,7 +6,9 @@ import numpy as np
 
 from micstools.reading import rest
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import attitude_change_deg
+from micstools.shapes.geometry import Array, attitude_change_deg
+
+SETTLED = 0.05  # change of a terminal speed
 
 
 @dataclass(frozen=True)
@@ -18,6 +20,7 @@ class BlockNumbers:
     at_rest: float  # after which it stays where it ends [s]
     fall_time: float  # from its release to the first row in which it touches something [s]
     fastest: float  # its largest speed until then [m/s]
+    terminal: float  # its speed down once that has settled, see `terminal_speed` [m/s]
     drift: float  # its way until then, seen from above [m]
     impact_speed: float  # before its first touch, the largest over a quarter of its length [m/s]
     contact_force: float  # the largest, a mean over a step [N]
@@ -48,6 +51,11 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
         at_rest=rest.of_block(run, k).time,
         fall_time=float(b.time[end] - b.release_time[k]) if touched.size else float("nan"),
         fastest=_largest(b.velocity[start : end + 1, k]),
+        terminal=terminal_speed(
+            b.time[start : end + 1],
+            b.position[start : end + 1, k, 2],
+            run.shapes[b.shape[k]].length,
+        ),
         drift=float(np.linalg.norm(way)),
         impact_speed=float(b.impact_speed[k]),
         contact_force=_largest(b.contact_force_max[start:, k, None]),
@@ -57,6 +65,19 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
         turned=float(attitude_change_deg(b.quaternion[-1, k], b.quaternion[start, k])),
         place=(x, y, z),
     )
+
+
+def terminal_speed(time: Array, height: Array, length: float) -> float:
+    """Mean speed down [m/s] from the middle of a fall to a length of the block above its end; nan
+    where it differs by more than SETTLED between the halves of that stretch."""
+    marks = np.linspace((height[0] + height[-1]) / 2, height[-1] + length, 3)
+    if not marks[0] > marks[2]:
+        return float("nan")
+    passed = np.interp(-marks, -np.minimum.accumulate(height), time)
+    first, second = (marks[0] - marks[1]) / np.diff(passed)
+    if not abs(first - second) <= SETTLED * first:
+        return float("nan")
+    return float((marks[0] - marks[2]) / (passed[2] - passed[0]))
 
 
 def _largest(vectors: np.ndarray) -> float:
