@@ -11,15 +11,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from browser import Browser
 from calls import mics_tools
 from micstools.pages import charts, ensemble_page
-from micstools.piles import pile_ensemble, pile_numbers, placing
+from micstools.piles import drawing, pile_ensemble, pile_numbers, placing
 from micstools.reading import shares
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
-from synthetic import UPRIGHT, Motion, write_run
+from synthetic import UPRIGHT, Motion, reword, write_run
 
 EDGE, HALF, HEXAPOD = 0.02, 0.01, 0.03
 LEFT, RIGHT, HIGH, WAITING = 0.04, 0.26, 0.12, (0.15, 0.05, 0.16)
@@ -167,6 +168,7 @@ def test_intervals_are_those_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the mean of 400 independent runs as of the normal distribution; the three blocks of a run
     that lie together count once."""
     monkeypatch.setattr(placing, "ends", lambda run: run)
+    monkeypatch.setattr(placing, "waiting", lambda run: 0)
     x = np.random.default_rng(5).normal(size=(400, 2))
     area = placing.Area((0.0, -9.0), (9.0, 9.0), True)
     for times in (1, 3):
@@ -314,6 +316,31 @@ def test_no_pattern_where_the_papers_blocks_are_not(ensemble: pile_ensemble.Ense
     assert "pattern" not in shown and "Were the runs enough" in shown
     assert "All blocks let go, five runs" in shown and "Blocks without room, one run" in shown
     assert shown.index("Where blocks will lie") < shown.index("How much piles differ")
+
+
+@pytest.mark.parametrize("turned", [0.0, 30.0])
+def test_maps_have_axes_frames_and_the_current(turned: float, tmp_path: Path) -> None:
+    """In metres of the survey; the shares tell what they leave out."""
+    folder, drawn = write_ensemble(tmp_path), list[Axes]()
+    reword(folder / "0001/result", lambda text: text.replace("&fluid", "&fluid velocity = 0, 3, 0"))
+    words = ["--area", "0.2", "0", "0.3", "0.1", "--origin", "354200,5621080,0"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "uri", lambda figure: drawn.append(figure.axes[0]) or "")
+        assert mics_tools(["report", str(folder), *words, "--north", str(turned)]) == 0
+    text = (folder / "report.html").read_text().replace("\u00a0", " ")
+    assert "7 (failed)" in text and "; left out: 1 not released." in text
+    assert "Solid line: the wanted area. Arrow: current, 3 m/s." in text and len(drawn) == 4
+    axes = drawn[0]
+    assert axes.get_xlabel() == "easting [m]" and axes.get_ylabel() == "northing [m]"
+    east, north = np.cos(np.radians(turned)), np.sin(np.radians(turned))
+    assert axes.get_xlim() == pytest.approx((354200 - 0.1 * north, 354200 + 0.3 * east), abs=1e-6)
+    drops, wanted = axes.patches
+    to = axes.transData.inverted()
+    corner = to.transform(wanted.get_transform().transform([[1, 0]]))[0]
+    assert corner == pytest.approx((354200 + 0.3 * east, 5621080 + 0.3 * north), abs=1e-6)
+    assert (drops.get_linestyle(), wanted.get_linestyle()) == ("--", "-")
+    (arrow,) = axes.collections
+    assert [*arrow.U, *arrow.V] == pytest.approx([-0.03 * north, 0.03 * east])
 
 
 def test_one_pile_is_an_ensemble(tmp_path: Path) -> None:

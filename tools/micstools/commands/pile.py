@@ -45,7 +45,9 @@ def work(given: argparse.Namespace) -> int:
     if pile_ensemble.is_ensemble(given.run):
         if given.paper:
             raise BadRun("--paper: for one run, not for an ensemble")
-        box, area = box_of(given.box), area_of(given.area)
+        told = options.told(given.run, given)
+        options.keep(told, given.run)
+        box, area = box_of(given.box), area_of(told.area)
         return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area))
     return _of_run(given)
 
@@ -85,6 +87,8 @@ def _of_ensemble(ensemble: Ensemble) -> int:
     each run into `pile.csv`, the maps into `pile_maps.h5`."""
     if ensemble.example.run.note:
         print(f"     {ensemble.example.run.note}")
+    if ensemble.left_out:
+        print(ensemble.left_words)
     for part in ensemble.parts:
         # Print what there is to say of the runs of one choice
         total = len(part.piles)

@@ -106,10 +106,14 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options)
     folder.mkdir(parents=True, exist_ok=True)
     all_places, all_landings, about = [], [], []
     ask_for_system(whole.example.run, survey)
+    if whole.about.get("start"):
+        print("no landings: units differ from load to load")
+    if whole.left_out:
+        print(whole.left_words)
     for number, part in enumerate(whole.parts, start=1):
         stem = "places" if len(whole.parts) == 1 else f"places-{number}"
         each, tolerance = pile_ensemble.places_of(part, survey, chosen.tolerance)
-        found = places.landings(each, tolerance)
+        found = [] if whole.about.get("start") else places.landings(each, tolerance)
         within = places.within([p for one in each for p in one], tolerance)
         if places.has_plan(part.example.run):
             head = f"{part.name}: " if part.name else ""

@@ -14,9 +14,8 @@ def work(given: argparse.Namespace) -> int:
     if given.crs:
         handover.crs_name(given.crs)
     if pile_ensemble.is_ensemble(given.run):
-        folder, area = given.run, area_of(given.area)
-        given.area = None  # of the layer, for one run
-        told = options.told(folder, given)
+        folder, told = given.run, options.told(given.run, given)
+        area = area_of(told.area)
         text = ensemble_page.page(pile_ensemble.open_ensemble(folder, area=area), told)
     else:
         run = command.open_run(given.run)

@@ -3,6 +3,7 @@ whether the runs were enough, and every pile to look at; the shares of the paper
 blocks drop on its three fixed ones."""
 
 import json
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +15,13 @@ from micstools.pages import charts, motion, run_page, run_words, views
 from micstools.pages.html import Markup, data, document, download, markup, section, table, tag
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
-from micstools.piles import pile, pile_ensemble, placing
+from micstools.piles import drawing, pile, pile_ensemble, placing
 from micstools.piles.options import Options
 from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Pile
 from micstools.reading import health, places
 from micstools.reading.health import Check
 from micstools.reading.overlap import present_bodies
+from micstools.reading.places import Survey
 from micstools.reading.reader import Run
 from micstools.reading.shares import in_words
 from micstools.reading.units import Units, figure
@@ -69,8 +71,8 @@ def page(ensemble: Ensemble, told: Options = Options()) -> str:  # noqa: B008 (i
         tag("h1", title),
         *(tag("p", sentence(part), class_="lead") for part in ensemble.parts),
         tag("p", assumptions(ensemble)),
-        *([_plan(ensemble)] if ensemble.whole else []),
-        _landings(ensemble, told),
+        *([_plan(ensemble, told.survey)] if ensemble.whole else []),
+        *([] if ensemble.about.get("start") else [_landings(ensemble, told)]),
         *([_patterns(ensemble)] if ensemble.has_patterns else []),
         *([_histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
@@ -136,11 +138,11 @@ def assumptions(ensemble: Ensemble) -> str:
     if run.physics == "coupled":
         coupling = run.value("numerics", "coupling")
         said[-1] += f", {cells} cells, coupling '{coupling}'"
+    if loads := ensemble.about.get("start"):
+        said.append(f"{count(len(loads), 'load')}, taken in turn, whose units are not compared")
     if varied:
         said.append("varied: " + "; ".join(_varied(ensemble, name) for name in varied))
-    if ensemble.left_out:
-        names = ", ".join(f"{k} ({v})" for k, v in ensemble.left_out.items())
-        said.append(f"left out for want of an outcome: runs {names}")
+    said += [ensemble.left_words] if ensemble.left_out else []
     return "; ".join(said) + "."
 
 
@@ -182,27 +184,31 @@ def _bar(share: float, low: float, high: float) -> Markup:
                role="img", aria_label=f"{share:.0f} %")  # fmt: skip
 
 
-def _plan(ensemble: Ensemble) -> Markup:
+def _plan(ensemble: Ensemble, survey: Survey) -> Markup:
     """The mean pile from above, for each choice of the varied variables to one scale of height."""
     whole = [part for part in ensemble.parts if part.whole]
     found = [pile_ensemble.maps(part) for part in whole]
     top, length = max(float(maps.high.max()) for maps in found), ensemble.units.length
-    size = ensemble.example.run.grid
-    extent = length.row((size.high - size.low)[:2], " x ")
-    note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
-    note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
+    run, area = ensemble.example.run, ensemble.area
+    areas = [placing.drop_area([p.run for p in ensemble.piles]), *([area] if area.given else [])]
+    note = f"Of the {len(ensemble.whole)} piles with all their blocks, fixed blocks included. "
+    note += "Dashed: where blocks are let go, half a block wider."
+    note += " Solid line: the wanted area." if area.given else ""
+    if speed := np.hypot(*run.current[:2]):
+        note += f" Arrow: current, {speed:.3g}\u00a0m/s."
     parts: list[Markup] = []
     for part, maps in zip(whole, found, strict=True):
         if part.name:
             parts.append(tag("h3", f"{part.name}: {count(len(part.whole), 'pile')}"))
-        heights = {"mean height above floor or bed": maps.mean,
+        drawn = [("probability that a block lies over a point [%]", 100 * maps.cover, 100.0)]
+        drawn += [(f"{name} [{length.name}]", length.of(values), length.of(top)) for name, values in
+                  {"mean height above floor or bed": maps.mean,
                    "height that 90 % of the piles exceed": maps.low,
-                   "height that 10 % of the piles exceed": maps.high}  # fmt: skip
-        drawn = [views.plan_map(length.of(values), length.of(top), name, length.name)
-                 for name, values in heights.items()]  # fmt: skip
-        cover = "probability that a block lies over a point"
-        cover_map = views.plan_map(100 * maps.cover, 100.0, cover, "%")
-        parts.append(tag("div", cover_map, *drawn, class_="maps"))
+                   "height that 10 % of the piles exceed": maps.high}.items()]  # fmt: skip
+        figures = [tag("figure", tag("img", alt=name, src=drawing.uri(drawing.over_plan(
+                   values, high, name, run, survey, areas))), class_="sheet")
+                   for name, values, high in drawn]  # fmt: skip
+        parts.append(tag("div", *figures, class_="maps"))
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
 
 
@@ -429,6 +435,8 @@ def _case(ensemble: Ensemble, run: Run) -> Markup:
     which = f"As in run {ensemble.example.number}; seeds differ from run to run."
     words.append(tag("p", which, class_="note"))
     command = f"mics-tools ensemble case.nml --runs {about['runs']} --seed {about['seed']}"
+    if about.get("start"):
+        command += f" --start {shlex.join(about['start'])}"
     if about.get("spread") is not None:
         command += f" --spread {about['spread']:g}"
     if about.get("tilt_deg") is not None:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from micstools.pages.charts import colour
@@ -234,44 +233,3 @@ def _numbers(seen: Seen) -> list[Markup]:
         found.append(tag("text", number, x=place[0], y=seen.block.shape[0] - place[1] + 10,
                          class_=kind, text_anchor="middle"))  # fmt: skip
     return found
-
-
-_MAP_WIDTH = 300.0
-"""Units of a drawing along the longer side of a map, whatever its points: words keep their size."""
-
-
-def plan_map(values: Array, top: float, name: str, unit: str) -> Markup:
-    """A map of the plan (ny, nx) in colours from 0 to `top`, which can be told apart in grey, with
-    their key."""
-    share = np.clip(values / (top or 1.0), 0, 1)
-    picture = Image.fromarray(_ramp(share[::-1]), "RGB")
-    step = _MAP_WIDTH / max(values.shape)
-    rows, columns = (round(step * n, 1) for n in values.shape)
-    strip = Image.fromarray(_ramp(np.linspace(0, 1, 64)[None]), "RGB")
-    bar = rows + 6
-    drawn = [
-        tag("image", href=uri(picture, 128), width=columns, height=rows,
-            preserveAspectRatio="none"),
-        tag("rect", class_="tank thin", x=0, y=0, width=columns, height=rows),
-        tag("image", href=uri(strip, 128), x=0, y=bar, width=columns / 2, height=7,
-            preserveAspectRatio="none"),
-    ]  # fmt: skip
-    for at, value in ((0.0, 0.0), (0.25, top / 2), (0.5, top)):
-        anchor = "start" if at == 0 else "middle"
-        words = f"{value:.3g} {unit}" if at == 0.5 else f"{value:.3g}"
-        drawn.append(tag("text", words, x=round(at * columns, 1), y=bar + 18,
-                         text_anchor=anchor, class_="little"))  # fmt: skip
-    size = f"width:{100 * columns / max(rows, columns):.0f}%"
-    svg = tag("svg", *drawn, viewBox=f"-1 -1 {columns + 2} {rows + 30}", role="img",
-              aria_label=name, style=size)  # fmt: skip
-    return tag("figure", tag("figcaption", f"{name} [{unit}]"), svg, class_="map")
-
-
-_RAMP = np.array([[250, 250, 247], [186, 222, 213], [96, 176, 184], [38, 110, 150], [22, 42, 92]])
-
-
-def _ramp(share: Array) -> NDArray[np.uint8]:
-    """Colours (..., 3) of shares from 0, nearly white, to 1, dark blue."""
-    at = share * (len(_RAMP) - 1)
-    parts = [np.interp(at, np.arange(len(_RAMP)), _RAMP[:, k]) for k in range(3)]
-    return np.round(np.stack(parts, axis=-1)).astype(np.uint8)

@@ -4,29 +4,37 @@ and a section through it."""
 import base64
 import io
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.transforms import Affine2D
 
 from micstools import files
 from micstools.piles import pile
 from micstools.piles.handover import Handover
 from micstools.piles.layer import Layer, Maps
+from micstools.piles.placing import Area
 from micstools.reading.overlap import Placed
-from micstools.reading.places import Place, is_within
-from micstools.reading.reader import BadRun
+from micstools.reading.places import Place, Survey, is_within
+from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array
 from micstools.shapes.height_maps import SURVEY
 
 COEFFICIENTS = {"cube": 1.10, "tetrapod": 1.02}
 """Layer coefficients k_t of a design. Source: The Rock Manual (CIRIA C683), table 3.11."""
 _GOOD, _BAD, _PLAIN, _HELD = "#4d9a6a", "#d1495b", "#8fa6b8", "#b9b9b9"
+_WATER = "#2f86c6"
+_RAMP = LinearSegmentedColormap.from_list(
+    "cover", ["#fafaf7", "#baded5", "#60b0b8", "#266e96", "#162a5c"]
+)
 _WIDE = 7.1  # of a figure, that of an A4 page between its margins [inch]
 _MANY = 200  # units: of more no names are written
 _FLAT = 0.05  # slope below which there is none to draw a section down
@@ -70,20 +78,52 @@ def plan(given: Handover) -> Figure:
         axes.add_collection(EllipseCollection(wide, wide, 0 * wide, units="xy", offsets=start,
                             offset_transform=axes.transData, facecolors="none", edgecolors="black",
                             linewidths=0.5, linestyles=":"))  # fmt: skip
-    axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
-    axes.set_ylim(corners[:, 1].min(), corners[:, 1].max())
-    far = bool((np.abs(corners) > SURVEY).any())
-    axes.set_xlabel("easting [m]" if far else "x [m]")
-    axes.set_ylabel("northing [m]" if far else "y [m]")
     axes.annotate("N", (0.97, 0.98), (0.97, 0.9), xycoords="axes fraction", ha="center",
                   arrowprops={"arrowstyle": "->"})  # fmt: skip
-    _plain(axes)
+    _survey_axes(axes, corners)
     keys: list[Patch | Line2D] = [Patch(color=_PLAIN, label="as built")]
     if within:
         ring = Line2D([], [], ls=":", color="black", label="tolerance around the planned place")
         keys = [Patch(color=_GOOD, label="within it"), Patch(color=_BAD, label="farther off"), ring]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=7, frameon=False)
     return figure
+
+
+def over_plan(values: Array, top: float, name: str, run: Run, survey: Survey,
+              areas: Sequence[Area]) -> Figure:  # fmt: skip
+    """A map (ny, nx) of the plan of the tank in colours from 0 to `top`, with areas, those that
+    nobody gave dashed, and an arrow of the current; ticks in the survey [m]."""
+    low, high = run.grid.low[:2], run.grid.high[:2]
+    corners = survey.of(np.array([low, high, [low[0], high[1]], [high[0], low[1]]]))
+    wide, tall = np.ptp(corners, axis=0)
+    figure = Figure(figsize=(4.6, float(np.clip(1.3 + 3.6 * tall / wide, 1.9, 6))),
+                    layout="constrained")  # fmt: skip
+    axes = figure.add_subplot(aspect="equal")
+    axes.set_title(name, fontsize=8)
+    place = Affine2D().rotate_deg(survey.north).translate(*survey.origin[:2]) + axes.transData
+    image = axes.imshow(values, _RAMP, extent=(low[0], high[0], low[1], high[1]), origin="lower",
+                        vmin=0, vmax=top or 1, transform=place)  # fmt: skip
+    figure.colorbar(image, location="bottom", shrink=0.5, aspect=30).ax.tick_params(labelsize=7)
+    for area in areas:
+        axes.add_patch(Rectangle(area.low, *np.subtract(area.high, area.low), fill=False, ec=_BAD,
+                       lw=1.5, ls="-" if area.given else "--", transform=place))  # fmt: skip
+    if (current := run.current[:2]).any():
+        start = low + 0.04 * (size := (high - low).max())
+        ends = survey.of(start + np.array([[0.0], [0.1 * size]]) * current / np.hypot(*current))
+        axes.quiver(*ends[0], *(ends[1] - ends[0]), angles="xy", scale_units="xy", scale=1,
+                    width=0.012, color=_WATER)  # fmt: skip
+    _survey_axes(axes, corners)
+    return figure
+
+
+def _survey_axes(axes: Axes, corners: Array) -> None:
+    """Axes around corners (n, 2) in a survey [m]."""
+    axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
+    axes.set_ylim(corners[:, 1].min(), corners[:, 1].max())
+    far = bool((np.abs(corners) > SURVEY).any())
+    axes.set_xlabel("easting [m]" if far else "x [m]", fontsize=8)
+    axes.set_ylabel("northing [m]" if far else "y [m]", fontsize=8)
+    _plain(axes)
 
 
 def section(given: Handover) -> Figure:
@@ -119,7 +159,7 @@ def section(given: Handover) -> Figure:
             LineCollection(list(cut), colors=_colour(given, given.places[k]), lw=1.3)
         )
     if water is not None and low < water + up < high:
-        axes.axhline(water + up, color="#2f86c6", lw=0.9, ls="--", label="water")
+        axes.axhline(water + up, color=_WATER, lw=0.9, ls="--", label="water")
     if thickness := _design(given, found, s, smooth):
         axes.plot(s, smooth + thickness, color="#d98d1f", lw=0.9, ls="-.", label="design surface")
     ends = ["{:.2f}, {:.2f}".format(*given.survey.of(point)) for point in (start, end)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from micstools.reading.overlap import Placed, images, present_bodies
+from micstools.reading.overlap import Placed, images, present_bodies, without_machines
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, IntArray
 
@@ -13,8 +13,8 @@ def usual_step(run: Run) -> float:
 
 
 def top_of(run: Run, step: float, row: int = -1) -> Array:
-    """Height map of the pile of a run at a row, as the tank shows it."""
-    blocks = images(run, present_bodies(run, row).values())
+    """Height map of the pile of a run at a row, as the tank shows it, without machines."""
+    blocks = images(run, without_machines(run, present_bodies(run, row)).values())
     return height_map(blocks, run.grid.low, run.grid.high, step)
 
 

@@ -84,6 +84,12 @@ class Ensemble:
         return placing([p.run for p in self.piles], self.area)
 
     @property
+    def left_words(self) -> str:
+        """What no number counts, and why; empty where there is nothing."""
+        names = ", ".join(f"{k} ({v})" for k, v in self.left_out.items())
+        return names and f"left out for want of an outcome: runs {names}"
+
+    @property
     def has_patterns(self) -> bool:
         """Do the paper's patterns A and B mean anything here?"""
         return has_papers_blocks(self.example.run)

@@ -34,6 +34,7 @@ class Placing:
     the tank lies where it passed the side."""
 
     blocks: int
+    left_out: int  # free blocks that were not released
     centre: tuple[float, float]  # mean of the centroids [m]
     spread: tuple[float, float]  # their standard deviation in x and y [m]
     half_within: float  # so far from the centre lie half of them at most [m]
@@ -47,6 +48,11 @@ class Placing:
 def ends(run: Run) -> Array:
     """Centroids (n, 2) [m] of the released free blocks at the end."""
     return np.asarray(run.into_tank(run.bodies.position[-1])[_released(run), :2])
+
+
+def waiting(run: Run) -> int:
+    """How many free blocks were not released."""
+    return len(run.bodies.dropped) - len(_released(run))
 
 
 def _released(run: Run) -> Array:
@@ -86,6 +92,7 @@ def placing(runs: Sequence[Run], area: Area) -> Placing | None:
     x, y, sx, sy, half, most, outside = (float(v) for v in found)
     return Placing(
         blocks=sum(map(len, each)),
+        left_out=sum(map(waiting, runs)),
         centre=(x, y),
         spread=(sx, sy),
         half_within=half,
@@ -129,11 +136,12 @@ def _outside(found: Placing, place: Unit) -> str:
     low, high = (f"{100 * v:.0f}" for v in found.outside_of_runs)
     x, y = (_at("xy"[d], (area.low[d], area.high[d]), place) for d in (0, 1))
     which = "wanted area" if area.given else "area of the drops"
+    left = f"; left out: {found.left_out} not released" if found.left_out else ""
     low_95, high_95 = (100 * v for v in found.interval_95["outside"])
     sure = f"; 95 % interval {low_95:.0f} to {high_95:.0f} %" if low_95 == low_95 else ""
     return (
         f" {100 * found.outside:.0f} % of them ({low} to {high} % in 90 % of the runs{sure}) lie "
-        f"outside the {which}, {x}, {y}\u00a0{place.name}."
+        f"outside the {which}, {x}, {y}\u00a0{place.name}{left}."
     )
 
 

@@ -185,6 +185,7 @@ class Within:
     units: int  # free ones, released
     count: int
     interval_95: tuple[float, float]
+    left_out: int = 0  # free ones that were not released
 
     @property
     def share(self) -> float:
@@ -206,14 +207,16 @@ def within(found: Sequence[Place], tolerance: float) -> Within:
     """Of all free units that were released."""
     units = placed(found)
     count = sum(is_within(p, tolerance) for p in units)
-    return Within(tolerance, len(units), count, wilson(count, len(units)))
+    left = sum(not p.fixed for p in found) - len(units)
+    return Within(tolerance, len(units), count, wilson(count, len(units)), left)
 
 
 def share_words(found: Within, length: Unit) -> str:
     """The share within a tolerance, in words."""
+    left = f"; left out: {found.left_out} not released" if found.left_out else ""
     return (
         f"{in_words(found.count, found.units)} of the free units lie within "
-        f"{length.text(found.tolerance)} of their place in the plan."
+        f"{length.text(found.tolerance)} of their place in the plan{left}."
     )
 
 

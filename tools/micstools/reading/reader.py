@@ -266,6 +266,14 @@ class Run:
         """Kind of boundary on each of the six sides."""
         return {side: self.value("boundary", side) for side in _SIDES}
 
+    @property
+    def current(self) -> Array:
+        """Velocity (3) [m/s] of the water that comes in through a side, else of that at first."""
+        inflows = [side for side, kind in self.sides.items() if kind == "inflow"]
+        if inflows and self.physics == "coupled":
+            return np.array(self.value("boundary", f"{inflows[0]}_velocity"), float)
+        return np.array(self.value("fluid", "velocity"), float) * (self.physics != "dry")
+
     @cached_property
     def periodic(self) -> tuple[bool, ...]:
         """Which of the three directions are periodic."""
