@@ -10,6 +10,7 @@ import ssl
 import subprocess
 import sys
 import time
+import tomllib
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -119,6 +120,45 @@ def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:
     assert small[0].text.count("spread = 0.005, 0.005, 0.0") == 2
     assert f"seed = {ensemble.seed_of(1, 0, 1)}" in small[0].text  # drops differ from each other
     assert "stop_when_settled = .true." in small[0].text
+
+
+CHANCE = tomllib.loads(Path(__file__).with_name("chance.toml").read_text())
+
+
+@pytest.mark.parametrize(
+    ("random", "drop"), [(k == "random", d) for k in CHANCE for d in CHANCE[k]]
+)
+def test_what_is_left_to_chance(random: bool, drop: str, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.csv"
+    plan.write_text("shape,x,y,z,time\nrock-07,0,0,0,0\nrock,1,0,0,0\n")
+    shapes = "&shape name='a' kind='cube' /\n&shape name = 'rock' kind = 'rock' /\n"
+    assert ensemble.is_random(f"{shapes}&drop {drop.replace('PLAN', str(plan))} /") == random
+    plan.write_text(plan.read_text().replace("rock,", "rock-08,"))
+    assert not ensemble.is_random(f"{shapes}&drop file = '{plan}' /")
+
+
+def test_loads_are_pooled(tmp_path: Path, program: Path, capsys) -> None:
+    """Plans and runs of an ensemble, one each, in place of the plan of the case."""
+    case, plans, fills = (program.parent / name for name in ("case.nml", "a.csv", "fills"))
+    case.write_text("&run t_end = 1.0 /\n&drop file = 'own.csv' /\n")
+    plans.write_text("shape,x,y,z,time\n")
+    rows = [{"run": n, "outcome": how, "folder": f"{n:04d}"}
+            for n, how in enumerate(("settled", "failed", "settled"), 1)]  # fmt: skip
+    fills.mkdir()
+    (fills / "ensemble.json").write_text(json.dumps({"format": "mics-ensemble", "table": rows}))
+    out = tmp_path / "out"
+    words = ("--start", str(plans), str(fills), "--slurm", "--out", str(out))
+    assert call(program, *words) == 0
+    said = capsys.readouterr()
+    assert "3 runs in" in said.out and "left out 1 of 3 runs: 2 (failed)" in said.err
+    texts = [(out / f"{n:04d}/case.nml").read_text() for n in (1, 2, 3)]
+    assert [settings.value(text, "drop", "file") for text in texts] == [str(plans), None, None]
+    runs = [str(fills / f"{n:04d}/result/run.h5") for n in (1, 3)]
+    assert [settings.value(text, "start", "file") for text in texts] == [None, *runs]
+    with (out / "ensemble.csv").open() as file:
+        assert [row["start"] for row in csv.DictReader(file)] == [str(plans), *runs]
+    assert call(program, "--runs", "4", *words) == 2  # the fourth would be the first again
+    assert "nothing is left to chance" in capsys.readouterr().err
 
 
 # Piles are the higher the larger the seed; fields are written where they are to.

@@ -263,7 +263,8 @@ class Case:
         """Run the case many times with other random drops, as `mics-tools ensemble` does.
 
         `vary`: values by variable, as {"contact.friction": [0.4, 0.6]}; `options`: seed, spread
-        [m], tilt [degrees], keep_fields. A second call with the same `out` runs what is missing."""
+        [m], tilt [degrees], keep_fields, start (loads). A second call with the same `out` runs
+        what is missing."""
         from micstools.commands.base import Parser
 
         if threading.current_thread() is not threading.main_thread():
@@ -274,7 +275,8 @@ class Case:
         for name, values in (vary or {}).items():
             words += ["--vary", f"{name}={','.join(str(v) for v in values)}"]
         for name, value in options.items():
-            words += [f"--{name.replace('_', '-')}", str(value)]
+            each = value if isinstance(value, (list, tuple)) else [value]
+            words += [f"--{name.replace('_', '-')}", *map(str, each)]
         case = folder.with_name(f"{folder.name}.nml")
         files.write(case, self._here())
         code = Parser("ensemble").call([str(case), *words])

@@ -23,6 +23,7 @@ from micstools.ensembles import (
 )
 from micstools.ensembles.ensemble import Member, Plan, State
 from micstools.ensembles.ensemble_engine import Engine
+from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun
 
 STOPPED = 130
@@ -32,11 +33,32 @@ STOPPED = 130
 def _plan(given: argparse.Namespace) -> Plan:
     text = program.case_text(given.case, given.settings)
     choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
+    loads = tuple(str(load) for path in given.start for load in _loads(path))
+    if not (runs := given.runs or len(loads)):
+        raise BadRun("--runs: how many? (with --start by default one for each load)")
     for word in given.vary:
         if re.fullmatch(r"[^=]+=\s*[+-]?\d+,\d+\s*", word):
             print(f"--vary {word}: two values (a decimal has a point)", file=sys.stderr)
     folder = given.out or Path(f"mics-ensemble-{given.case.stem}")
-    return Plan(text, folder, given.runs, given.seed, given.spread, given.tilt, choices)
+    return Plan(text, folder, runs, given.seed, given.spread, given.tilt, choices, loads)
+
+
+def _loads(path: Path) -> list[Path]:
+    """The files with a load that a user means: a plan, a run.h5, that of a folder, or those of all
+    runs of an ensemble that came to rest; what is left out is told."""
+    if not pile_ensemble.is_ensemble(path):
+        found = path / "run.h5" if path.is_dir() else path
+        if not found.is_file():
+            raise BadRun(f"--start {path}: is no plan (.csv), no run.h5, and no folder of results")
+        return [found]
+    rows = pile_ensemble.about(path / "ensemble.json")["table"]
+    left = [f"{row['run']} ({row['outcome']})" for row in rows if row["outcome"] != "settled"]
+    if left:
+        print(f"--start {path}: left out {len(left)} of {len(rows)} runs: {', '.join(left)}",
+              file=sys.stderr)  # fmt: skip
+    if len(left) == len(rows):
+        raise BadRun(f"--start {path}: no run settled")
+    return [path / row["folder"] / "result/run.h5" for row in rows if row["outcome"] == "settled"]
 
 
 @contextlib.contextmanager
@@ -96,14 +118,7 @@ def work(given: argparse.Namespace) -> int:
         raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
     plan, engine = _plan(given), Engine(program.find(given.program, given.case), given.jobs, queue)
     members = list(ensemble.members(plan))
-    text = members[0].text
-    chance = any(
-        settings.value(text[start:end], "drop", name) not in (None, 0, 0.0, [0, 0, 0], "given")
-        for group, start, end in settings.groups(text)
-        if group == "drop"
-        for name in ("spread", "tilt_deg", "orientation")
-    )
-    if plan.runs > 1 and not chance:  # they would all be the same
+    if plan.runs > max(1, len(plan.loads)) and not ensemble.is_random(members[0].text):
         raise BadRun("nothing is left to chance in this case: give --spread or --tilt")
     wanted, again = _kept(given, plan, len(members))
     # check the first run of each choice and say what one takes

@@ -9,6 +9,7 @@ How a run ended is read from these files alone, so it does not matter who ran it
 """
 
 import itertools
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,7 @@ class Plan:
     spread: float | None = None  # [m]
     tilt: float | None = None  # [degrees]
     choices: tuple[tuple[Setting, ...], ...] = ((),)
+    loads: tuple[str, ...] = ()  # files, taken in turn
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Member:
     choice: tuple[Setting, ...]
     text: str
     folder: Path
+    load: str = ""
 
     @property
     def case(self) -> Path:
@@ -98,22 +101,59 @@ def members(plan: Plan, fields: bool = False) -> Iterator[Member]:
     """All runs; the same seeds for every choice, so that choices differ in nothing else. More runs
     come after those that were there, so an ensemble may grow. `fields`: write those of the water,
     as often as the case says."""
-    drops = sum(name == "drop" for name, _, _ in settings.groups(plan.text))
-    if not drops and plan.runs > 1:
-        raise BadRun("the case has no &drop: all runs would be the same")
     for number, (index, choice) in enumerate(
         itertools.product(range(plan.runs), plan.choices), start=1
     ):
         text = settings.set_variables(plan.text, choice)
         text = settings.set_group(text, "run", ({} if fields else NO_FIELDS) | UNATTENDED)
-        for group in range(drops):
+        load = plan.loads[index % len(plan.loads)] if plan.loads else ""
+        text = with_load(text, load) if load else text
+        for group in range(sum(name == "drop" for name, _, _ in settings.groups(text))):
             drawn: dict[str, Any] = {"seed": seed_of(plan.seed, index, group)}
             if plan.spread is not None:
                 drawn["spread"] = [plan.spread, plan.spread, 0.0]
             if plan.tilt is not None:
                 drawn["tilt_deg"] = plan.tilt
             text = settings.set_group(text, "drop", drawn, group)
-        yield Member(number, seed_of(plan.seed, index), choice, text, plan.folder / f"{number:04d}")
+        folder = plan.folder / f"{number:04d}"
+        yield Member(number, seed_of(plan.seed, index), choice, text, folder, load)
+
+
+def with_load(text: str, load: str) -> str:
+    """The case with blocks from a file, a plan (.csv) or the run.h5 in which they were left, in
+    place of those of its plan."""
+    if load.lower().endswith(".csv"):
+        plans = [n for n, group in enumerate(_drops(text)) if group.get("file")]
+        return settings.set_group(text, "drop", {"file": load}, plans[0] if plans else None)
+    for name, start, end in reversed(settings.groups(text)):
+        if name == "drop" and settings.variables(text[start:end]).get("file"):
+            text = text[:start] + text[end:]
+    return settings.set_group(text, "start", {"file": load})
+
+
+def is_random(text: str) -> bool:
+    """Do the seeds of a case's drops change anything: a place, an attitude or the stone, the shape
+    that is drawn?"""
+    found = settings.groups(text)
+    shapes = [settings.variables(text[start:end]) for name, start, end in found if name == "shape"]
+    stones = {str(shape.get("name")) for shape in shapes if shape.get("kind") == "rock"}
+    for drop in _drops(text):
+        path = Path(str(drop.get("file") or ""))
+        rows = path.read_text(errors="replace") if path.is_file() else ""
+        drawn = {drop.get("shape"), *re.split(r"[\s,;]+", rows)}
+        scattered = any(drop.get(name) not in (None, 0, 0.0, [0, 0, 0], "given")
+                        for name in ("spread", "tilt_deg", "orientation"))  # fmt: skip
+        if scattered or stones & drawn or isinstance(drop.get("shapes"), list):
+            return True
+    return False
+
+
+def _drops(text: str) -> list[dict[str, Any]]:
+    return [
+        settings.variables(text[start:end])
+        for name, start, end in settings.groups(text)
+        if name == "drop"
+    ]
 
 
 def write_case(member: Member) -> None:

@@ -18,6 +18,7 @@ def rows(table: Table) -> list[dict[str, Any]]:
     return [
         {"run": m.number, "seed": m.seed}
         | {s.name: s.value for s in m.choice}
+        | ({"start": m.load} if m.load else {})
         | {
             "outcome": end.outcome,
             "exit_code": "" if end.code is None else end.code,
@@ -53,6 +54,7 @@ def write(plan: Plan, table: Table) -> None:
         "seed": plan.seed,
         "spread": plan.spread,
         "tilt_deg": plan.tilt,
+        "start": list(plan.loads),
         "choices": [{s.name: s.value for s in choice} for choice in plan.choices],
         "case": plan.text,
         "outcomes": shares(table),
