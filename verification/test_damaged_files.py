@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT
+from shared_runs import texts
 from soak.fuzz_files import FILES, KINDS, REFUSED, TAKEN, damaged, run, try_file
 from test_messages import STARTS
 
@@ -42,21 +43,7 @@ def test_damaged_files(kind: str) -> None:
 
 
 @pytest.mark.parametrize("model", ["surface", "spheres"])
-@pytest.mark.parametrize(
-    "given",
-    [
-        "kind = 'hexapod' size = 1e-6",
-        "kind = 'cube' size = 1e5 refinement = 8",
-        "kind = 'box' size = 60, 60, 1",
-        "kind = 'box' size = 1, 1, 100",
-        "kind = 'sphere' size = 1e-5",
-        "kind = 'cylinder' size = 100, 1 spheres = 'inscribed'",
-        "kind = 'cylinder' size = 1, 60",
-        "kind = 'tetrapod' size = 1e5 refinement = 6",
-        "kind = 'dolos' size = 1e-5 spheres = 'dense'",
-        "kind = 'reef_cube' size = 1e5 refinement = 6",
-    ],
-)
+@pytest.mark.parametrize("given", texts("damaged_files")["extreme_shapes"])
 def test_extreme_shapes_run(given: str, model: str, tmp_path: Path) -> None:
     """What is not refused makes its steps, in both contact models."""
     sizes = re.search(r"size = ([-+.,e\d ]+)", given)

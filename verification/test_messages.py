@@ -9,7 +9,6 @@ import re
 import resource
 import struct
 import subprocess
-import tomllib
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -17,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT
+from shared_runs import texts
 
-_TEXTS = tomllib.loads((Path(__file__).parent / "messages" / "starts.toml").read_text())
-STARTS, NAMED = _TEXTS["starts"], _TEXTS["named"]
+STARTS, NAMED = (texts("messages")[name] for name in ("starts", "named"))
 RUN, GRID = STARTS["run"], STARTS["grid"]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from measures.budget import Budget
 from micstools.reading.reader import Run
-from shared_runs import mics
+from shared_runs import mics, texts
 
 GRID = "&grid cells = 12, 4, 12  length = 0.24, 0.08, 0.24 /\n"
 CUBE = "&shape name = 'cube'  kind = 'cube'  size = 0.03 /\n"
@@ -53,22 +53,9 @@ def test_blocks_begin_where_they_were(filled: Path, named: bool, time: float) ->
         assert (b["bodies/release_time"][: 1 + there] == 0).all()
 
 
-@pytest.mark.parametrize(
-    ("start", "rest", "message"),
-    [
-        ("file = 'no.h5'", THREE, "no.h5"),
-        ("file = 'case.nml'", THREE, "case.nml"),
-        ("file = 'fill/run.h5'  time = 9", THREE, "&start time = 9: the run in 'fill/run.h5' goes "
-         "from 0 to 0.5 s"),
-        ("file = 'fill/run.h5'  time = -2", THREE, "must not be negative [s]; -1 means the end"),
-        ("time = 1", THREE, "must name the run.h5"),
-        ("file = 'fill/run.h5'", THREE.replace("count = 3", "count = 2"), "up to number 3, this "
-         "case names 2"),
-        ("file = 'fill/run.h5'  shift = 0.13, 0, 0.08", THREE, "overlaps the &body on line"),
-        ("file = 'fill/run.h5'  shift = 0.3, 0, 0", THREE, "through the wall x_max"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(filled: Path, start: str, rest: str, message: str) -> None:
+@pytest.mark.parametrize(("start", "named", "message"), texts("start")["refused"])
+def test_what_is_refused(filled: Path, start: str, named: int, message: str) -> None:
+    rest = THREE.replace("count = 3", f"count = {named}")
     done = mics(filled, THEN + GRID + CUBE + f"&start {start} /\n" + rest)
     assert done.returncode == 2 and message in done.stderr, done.stderr
 

@@ -136,10 +136,7 @@ def points_and_triangles(obj: bytes) -> bytes:
     [
         ("stl_ascii", bytes.upper),
         ("stl_ascii", lambda b: b.replace(b"endsolid", b"ENDSOLID hexapod")),
-        (
-            "stl_ascii",
-            lambda b: b.replace(b"endsolid", b"end solid").replace(b"endloop", b"End Loop"),
-        ),
+        ("stl_ascii", lambda b: b.replace(b"endsolid", b"end solid").replace(b"dloop", b"d Loop")),
         ("stl_ascii", lambda b: BOM_UTF8 + b),
         ("obj", lambda b: BOM_UTF8 + points_and_triangles(b)),  # it hides no point
         ("stl", lambda b: b + b"\n"),
