@@ -44,8 +44,7 @@ def _plan(given: argparse.Namespace) -> Plan:
 
 
 def _loads(path: Path) -> list[Path]:
-    """The files with a load that a user means: a plan, a run.h5, that of a folder, or those of all
-    runs of an ensemble that came to rest; what is left out is told."""
+    """The load of a plan or of results, or those of an ensemble, of its runs that settled."""
     if not pile_ensemble.is_ensemble(path):
         found = path / "run.h5" if path.is_dir() else path
         if not found.is_file():

@@ -15,8 +15,8 @@ def work(given: argparse.Namespace) -> int:
         handover.crs_name(given.crs)
     if pile_ensemble.is_ensemble(given.run):
         folder, told = given.run, options.told(given.run, given)
-        area = area_of(told.area)
-        text = ensemble_page.page(pile_ensemble.open_ensemble(folder, area=area), told)
+        found = pile_ensemble.open_ensemble(folder, area=area_of(told.area))
+        text = ensemble_page.page(found, told)
     else:
         run = command.open_run(given.run)
         folder, told = run.folder, options.told(run.folder, given)

@@ -123,7 +123,7 @@ def with_load(text: str, load: str) -> str:
     """The case with blocks from a file, a plan (.csv) or the run.h5 in which they were left, in
     place of those of its plan."""
     if load.lower().endswith(".csv"):
-        plans = [n for n, group in enumerate(_drops(text)) if group.get("file")]
+        plans = [n for n, group in enumerate(_groups(text, "drop")) if group.get("file")]
         return settings.set_group(text, "drop", {"file": load}, plans[0] if plans else None)
     for name, start, end in reversed(settings.groups(text)):
         if name == "drop" and settings.variables(text[start:end]).get("file"):
@@ -134,10 +134,8 @@ def with_load(text: str, load: str) -> str:
 def is_random(text: str) -> bool:
     """Do the seeds of a case's drops change anything: a place, an attitude or the stone, the shape
     that is drawn?"""
-    found = settings.groups(text)
-    shapes = [settings.variables(text[start:end]) for name, start, end in found if name == "shape"]
-    stones = {str(shape.get("name")) for shape in shapes if shape.get("kind") == "rock"}
-    for drop in _drops(text):
+    stones = {str(g.get("name")) for g in _groups(text, "shape") if g.get("kind") == "rock"}
+    for drop in _groups(text, "drop"):
         path = Path(str(drop.get("file") or ""))
         rows = path.read_text(errors="replace") if path.is_file() else ""
         drawn = {drop.get("shape"), *re.split(r"[\s,;]+", rows)}
@@ -148,12 +146,9 @@ def is_random(text: str) -> bool:
     return False
 
 
-def _drops(text: str) -> list[dict[str, Any]]:
-    return [
-        settings.variables(text[start:end])
-        for name, start, end in settings.groups(text)
-        if name == "drop"
-    ]
+def _groups(text: str, wanted: str) -> list[dict[str, Any]]:
+    found = [text[start:end] for name, start, end in settings.groups(text) if name == wanted]
+    return [settings.variables(group) for group in found]
 
 
 def write_case(member: Member) -> None:

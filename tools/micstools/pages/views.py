@@ -1,5 +1,5 @@
 """A pile seen from the front, the side and the top, in parallel and to one scale, as an engineer
-draws it; and maps of the plan. No OpenGL is needed."""
+draws it. No OpenGL is needed."""
 
 import base64
 import io

@@ -29,8 +29,7 @@ class Options:
     crs: str | None = None  # as EPSG:25832
     tolerance: float | None = None  # of the deviation [m]
     layers: int | None = None
-    area: list[float] | None = None  # in the tank: x0, y0, x1, y1 [m]; of the layer of a run, of
-    # an ensemble that in which blocks should lie
+    area: list[float] | None = None  # x0, y0, x1, y1 [m] of the layer, or where blocks should lie
     section: list[float] | None = None  # likewise: from x0, y0 to x1, y1 [m]
 
     @property
