@@ -52,8 +52,8 @@ def test_contact_is_solved_as_the_model_asks(tmp_path: Path) -> None:
     assert "&contact substep_ratio: has no meaning with solver = 'impulses', passed over" in idle
 
 
-@pytest.mark.cost(5)
-@pytest.mark.parametrize(("case", "t_end"), [("crane", 60), ("roundhead", 60), ("blocks", 10)])
+@pytest.mark.cost(10)
+@pytest.mark.parametrize(("case", "t_end"), [("crane", 99), ("mound", 3), ("blocks", 10)])
 def test_the_time_of_a_light_run(case: str, t_end: float, tmp_path: Path) -> None:
     """It takes between the told time over 2.5 and 2.5 times that, on one core."""
     text = case_text(ROOT / "input" / f"{case}.nml", ["run.physics=light", f"run.t_end={t_end}"])
@@ -64,7 +64,8 @@ def test_the_time_of_a_light_run(case: str, t_end: float, tmp_path: Path) -> Non
     mics(["--quiet", "--threads", "1"], tmp_path, text)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    assert 1 / 2.5 < took / (float(told) * (60 if unit == "minutes" else 1)) < 2.5
+    ratio = took / (float(told) * (60 if unit == "minutes" else 1))
+    assert 1 / 2.5 < ratio < 2.5, f"told {told} {unit}, took {took:.2f} s of CPU"
 
 
 @pytest.mark.parametrize("physics", ["dry", "fluid"])

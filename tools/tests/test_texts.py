@@ -2,6 +2,7 @@
 is there, stages, versions and constants are those of the sources, links of built pages are good."""
 
 import re
+import tomllib
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -18,6 +19,7 @@ from packages import HEIGHT, TOP
 
 TEXTS = ["README.md", "docs/guide.md", "docs/gallery.md"]
 GALLERY = ROOT / "docs" / "gallery.md"
+ROWS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text())
 PAGES = ["README.md", "CONTRIBUTING.md", "CITATION.cff", "verification/README.md"]
 PAGES += sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md"))
 PAGES += sorted(str(page.relative_to(ROOT)) for page in ROOT.glob("verification/cases/*/README.md"))
@@ -27,19 +29,7 @@ FOLDERS = ("src", "docs", "tools", "input", "verification")
 FROM_TOP = re.compile(rf"(?<![\w/.:-])(?:{'|'.join(FOLDERS)})/[\w./*-]*\w")
 FROM_SRC = re.compile(rf"(?<![\w/.-])(?:{'|'.join(sorted(HEIGHT.keys() - {TOP}))})/[\w*]+\.f90")
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
-WORDS = {
-    "README.md": 1800,
-    "docs/theory.md": 6000,
-    "docs/glossary.md": 600,
-    "docs/decisions/*.md": 1300,
-}
-"""The most words of a text."""
-VERSIONS = {
-    "Makefile": r"^VERSION := (.*)$",
-    "CITATION.cff": r"^version: (.*)$",
-    "pyproject.toml": r'^version = "(.*)"$',
-    "CHANGELOG.md": r"^## \[(\d.*)\]",
-}
+VERSIONS = ROWS["versions"]
 """Where the version stands; in the changelog that of the newest release."""
 MADE = ("verification/report",)  # by a run, not in the repository
 STEP = (ROOT / "src/step.f90").read_text()
@@ -66,7 +56,7 @@ def test_a_file_that_is_gone_is_found() -> None:
     assert missing("docs/theory.md", "[a](no.md) [b](figures/pile.png)") == ["no.md"]
 
 
-@pytest.mark.parametrize(("pattern", "most"), WORDS.items())
+@pytest.mark.parametrize(("pattern", "most"), ROWS["words"].items())
 def test_texts_are_short(pattern: str, most: int) -> None:
     for page in ROOT.glob(pattern):
         assert len(page.read_text().split()) <= most, page
@@ -161,18 +151,7 @@ def linked(text: str) -> tuple[str, list[str]]:
     return with_links(PAGE, text, links), links.problems
 
 
-@pytest.mark.parametrize(
-    ("text", "url"),
-    [
-        ("[x](../README.md)", "index.html"),
-        ("[x](figures/pile.png)", "media/pile.png"),
-        ("`src/grid/mixture.f90`", "module/mixture_m.html"),
-        ("`grid/mixture.f90`", "module/mixture_m.html"),
-        ("`mixture.f90`", "module/mixture_m.html"),
-        ("`src/mics.f90`", "program/mics.html"),
-        ("`input/blocks.nml`", "files/input/blocks.nml"),
-    ],
-)
+@pytest.mark.parametrize(("text", "url"), ROWS["links"])
 def test_names_become_links(text: str, url: str) -> None:
     found, problems = linked(text)
     assert problems == []
@@ -186,16 +165,7 @@ def test_names_of_no_file_are_found(text: str) -> None:
     assert len(problems) == 1
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[x](https://example.org/a.md)",
-        "[x](#part)",
-        "`case.nml`",
-        "`law_NAME.f90`",
-        "```\n`no/file.f90`\n```",
-    ],
-)
+@pytest.mark.parametrize("text", ROWS["alone"])
 def test_what_is_left_alone(text: str) -> None:
     assert linked(text) == (text, [])
 
@@ -207,19 +177,7 @@ def test_all_texts_name_files_that_are_there() -> None:
     assert links.problems == []
 
 
-@pytest.mark.parametrize(
-    ("link", "problem"),
-    [
-        ('<a href="b.html">', ""),
-        ('<a href="b.html#part">', ""),
-        ('<a href="https://example.org">', ""),
-        ('<a href="c.html">', "no such file: c.html"),
-        ('<a href="../a.html">', "no such file: ../a.html"),
-        ('<a href="b.html#other">', "no such part: b.html#other"),
-        ('<img src="c.png">', "no such file: c.png"),
-        ('<script src="https://example.org/x.js"></script>', "loaded from a server"),
-    ],
-)
+@pytest.mark.parametrize(("link", "problem"), ROWS["broken"])
 def test_broken_links(link: str, problem: str, tmp_path: Path) -> None:
     (tmp_path / "a.html").write_text(link)
     (tmp_path / "b.html").write_text('<p id="part">')
