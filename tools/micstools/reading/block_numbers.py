@@ -71,11 +71,11 @@ def terminal_speed(time: Array, height: Array, length: float) -> float:
     """Mean speed down [m/s] from the middle of a fall to a length of the block above its end; nan
     where it differs by more than SETTLED between the halves of that stretch."""
     marks = np.linspace((height[0] + height[-1]) / 2, height[-1] + length, 3)
-    if not marks[0] > marks[2]:
-        return float("nan")
     passed = np.interp(-marks, -np.minimum.accumulate(height), time)
+    if not (marks[0] > marks[2] and (np.diff(passed) > 0).all()):
+        return float("nan")
     first, second = (marks[0] - marks[1]) / np.diff(passed)
-    if not abs(first - second) <= SETTLED * first:
+    if abs(first - second) > SETTLED * first:
         return float("nan")
     return float((marks[0] - marks[2]) / (passed[2] - passed[0]))
 
