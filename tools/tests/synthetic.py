@@ -213,16 +213,8 @@ def _write_provenance(h5: h5py.File, motion: Motion) -> None:
     start = point(0.15, 0.05, 0.16)
     case += "".join(DROP.format(start, k * scale**0.5) for k in range(len(motion.places)))
     case += motion.more
-    h5.create_group("provenance").attrs.update(
-        {
-            "namelist": case,
-            "parameters": case,
-            "version": "0.1.0",
-            "threads": 1,
-            "ranks": 1,
-            "exit_status": 0,
-        }
-    )
+    about = h5.create_group("provenance").attrs
+    about.update(namelist=case, parameters=case, version="0.1.0", threads=1, ranks=1, exit_status=0)
 
 
 def _write_bodies(
