@@ -99,7 +99,7 @@ contains
     warnings = warnings + 1
     if (.not. is_root()) return
     write (error_unit, '(7a)') 'mics: warning: ', body_text(b, blocks), ' ', what, ', t = ', &
-      to_text(time), ' s'
+      brief(time, 7), ' s'
     flush (error_unit)
   end subroutine warn
 

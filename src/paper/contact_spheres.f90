@@ -45,7 +45,7 @@ module contact_spheres_m
     type(candidates_t) :: list
     !> Poses at which the list was made.
     logical :: listed = .false.
-    logical, allocatable :: present(:)
+    logical, allocatable :: present(:), fixed(:)
     real(wp), allocatable :: x(:, :), q(:, :)
     real(wp), allocatable :: turn(:, :, :)     !! (3, 3, bodies) body to space
     type(pair_list_t) :: near
@@ -71,7 +71,7 @@ contains
           self%set(s)%bins)
       end associate
     end do
-    allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
+    allocate (self%bounding_radius(blocks%n), self%present(blocks%n), self%fixed(blocks%n))
     allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
@@ -99,7 +99,8 @@ contains
     holds = self%listed
     do b = 1, blocks%n
       if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
-      if (holds) holds = blocks%present(b) .eqv. self%present(b)
+      if (holds) holds = (blocks%present(b) .eqv. self%present(b)) &
+        .and. (blocks%fixed(b) .eqv. self%fixed(b))
       ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
       if (holds .and. blocks%present(b)) holds = .not. norm(blocks%x(:, b) - self%x(:, b)) &
         + 2*self%bounding_radius(b)*norm(blocks%q(:, b) - self%q(:, b)) > self%valid_way
@@ -155,6 +156,7 @@ contains
     self%list%first(self%list%n_pairs + 1) = self%list%n + 1
     self%listed = .true.
     self%present = blocks%present
+    self%fixed = blocks%fixed
     self%x = blocks%x
     self%q = blocks%q
   end subroutine make_list
