@@ -17,7 +17,8 @@ module bed_solid_m
   private
   public :: make_bed_solid
 
-  real(wp), parameter :: min_tet = 1.0e-15_wp   !! smaller parts are dropped [cells]
+  real(wp), parameter :: min_tet = 1.0e-15_wp     !! smaller parts are dropped [cells]
+  real(wp), parameter :: round_off = 1.0e-6_wp    !! nearer to a side is in it, over the tank [-]
 
   !> Polygons of the surface, one after the other, and tetrahedra, four corners each; those of
   !! facets that look down have negative volumes.
@@ -51,6 +52,10 @@ contains
       call facet_within(bed, f, low, high, n, p)
       call clip_polygon(3, low(3), 1.0_wp, n, p)
       if (n < 3) cycle
+      do d = 1, 2   ! a bed that ends at a side but for rounding ends there
+        where (p(d, :n) < low(d) + round_off*grid%length(d)) p(d, :n) = low(d)
+        where (p(d, :n) > high(d) - round_off*grid%length(d)) p(d, :n) = high(d)
+      end do
       ! in a side walls are put anyway
       if (any(all(p(:2, :n) <= spread(low(:2), 2, n), 2)) &
           .or. any(all(p(:2, :n) >= spread(high(:2), 2, n), 2))) cycle

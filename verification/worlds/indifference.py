@@ -46,9 +46,8 @@ def looks(world: World, folder: Path) -> None:
     at = np.isin(one.series.time, rows.series.time)
     for name in ("position", "quaternion", "velocity", "angular_velocity"):
         x, y = getattr(one.bodies, name)[at], getattr(rows.bodies, name)
-        if name == "quaternion":  # its sign follows that of the row before
-            y = y * np.copysign(1.0, (x * y).sum(axis=-1, keepdims=True))
-        if not np.array_equal(x, y, equal_nan=True):
+        sign = np.copysign(1.0, (x * y).sum(axis=-1, keepdims=True))  # follows the row before
+        if not np.array_equal(x, y * (sign if name == "quaternion" else 1.0), equal_nan=True):
             raise Broken(f"&run history_interval changes {name}")
     if one.series.time[-1] != rows.series.time[-1]:
         raise Broken("&run history_interval changes the last row")

@@ -68,14 +68,14 @@ contains
     call check('the bed is made: '//message, walls%bed%there)
   end subroutine lay_bed
 
-  !> A tank with a map of the plane z = slope.(x, y, 1).
+  !> A tank with a map of the plane z = slope.(x, y, 1), which ends in a side but for rounding.
   subroutine sloping_tank()
     integer :: i, j
 
     open (newunit=unit, file='slope.txt', status='replace')
-    write (unit, '(a)') '# a plane', '6 5  -0.013 0 0.03 0.03  # points, first, spacing'
+    write (unit, '(a)') '# a plane', '6 5  -0.013 0 0.0226 0.03  # points, first, spacing'
     do j = 0, 4
-      write (unit, *) [(dot_product(slope, [-0.013_wp + 0.03_wp*i, 0.03_wp*j, 1.0_wp]), i=0, 5)]
+      write (unit, *) [(dot_product(slope, [-0.013_wp + 0.0226_wp*i, 0.03_wp*j, 1.0_wp]), i=0, 5)]
     end do
     close (unit)
     call read_bed_file('slope.txt', 'heightmap', form, message)
@@ -141,6 +141,12 @@ contains
       end associate
     end do
     call check('there are many', solid%n_cut > 50)
+    i = grid%n(1) + 1
+    do j = 1, grid%n(2)
+      at = dot_product(slope, [grid%face(i, 1), grid%centre(j, 2), 1.0_wp])
+      call check('faces in the far side', grid%h(3)*(9 - sum(solid%aperture(i, j, 1:9, 1))), at, &
+        1.0e-15_wp)
+    end do
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
         height = [dot_product(slope, [grid%face(i, 1), grid%centre(j, 2), 1.0_wp]), &
