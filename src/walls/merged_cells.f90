@@ -21,6 +21,7 @@ module merged_cells_m
 
   integer, parameter :: halo_layers = 2      !! layers of the halo with small cells that are needed
   integer, parameter :: max_targets = 3  !! of a small cell
+  integer, parameter :: here(3) = 0      !! no step
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a target.
   type :: merged_cells_t
@@ -111,13 +112,12 @@ contains
   end subroutine find_merged_cells
 
   !> In the domain, and an own cell or one of the layers of the halo that matter.
-  pure function is_near(grid, c, layers) result(yes)
+  pure logical function is_near(grid, c, layers)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: c(3)
     integer, intent(in) :: layers
-    logical :: yes
 
-    yes = all(c >= grid%lo - layers .and. c <= grid%hi + layers) .and. .not. grid%outside(c)
+    is_near = all(c >= grid%lo - layers .and. c <= grid%hi + layers) .and. .not. grid%outside(c)
   end function is_near
 
   !> A wall cell more, if it is not in the list.
@@ -226,7 +226,6 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
-    integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: m, n, n_known, o(3), body
     real(wp), allocatable :: most(:)
@@ -307,7 +306,6 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
-    integer, parameter :: here(3) = 0
     real(wp) :: middle, y
     integer :: m
 
@@ -333,7 +331,7 @@ contains
 
   !> Steps from small cell c to its targets, and their shares of it, zero where there is none: cells
   !! across its open faces whose centre lies in the fluid, by open area along the normal; without
-  !! any the one of the 26 around it that is most along the normal.
+  !! any the one of the 26 around it that is most along the normal, or those that are so alike.
   pure subroutine to_targets(grid, solid, c, normal, steps, share)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -341,8 +339,9 @@ contains
     real(wp), intent(in) :: normal(3)   !! of the wall
     integer, intent(out) :: steps(3, max_targets)
     real(wp), intent(out) :: share(max_targets)
-    integer :: d, f(3), i, j, k
-    real(wp) :: along, way(3)
+    real(wp), parameter :: same = 1.0e-9_wp   ! no more than rounding between directions
+    integer :: d, f(3), i, j, k, n
+    real(wp) :: along, cosine, way(3)
 
     do d = 1, 3
       steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
@@ -356,18 +355,22 @@ contains
       return
     end if
     along = 0.0_wp
+    n = 0
     do k = -1, 1
       do j = -1, 1
         do i = -1, 1
           if (.not. centre_in_fluid(grid, solid, c + [i, j, k])) cycle
           way = real([i, j, k], wp)*(grid%h/grid%h(1))
-          if (dot_product(normal, way)/norm(way) <= along) cycle
-          along = dot_product(normal, way)/norm(way)
-          steps(:, 1) = [i, j, k]
-          share(1) = 1.0_wp
+          cosine = dot_product(normal, way)/norm(way)
+          if (cosine <= along*(1.0_wp - same)) cycle
+          if (cosine > along*(1.0_wp + same)) n = 0
+          n = min(n + 1, max_targets)
+          along = cosine
+          steps(:, n) = [i, j, k]
         end do
       end do
     end do
+    share(:n) = 1.0_wp/real(max(n, 1), wp)
   end subroutine to_targets
 
   !> The parts of small cells of each target beside an own cell, in the order of their places around
@@ -433,12 +436,11 @@ contains
   end subroutine group_small_cells
 
   !> Is this small cell a group of its own?
-  elemental function is_unmerged(self, small) result(yes)
+  elemental logical function is_unmerged(self, small)
     type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: small
-    logical :: yes
 
-    yes = all(self%target(:, small) == 0)
+    is_unmerged = all(self%target(:, small) == 0)
   end function is_unmerged
 
   !> Velocity of the wall of a wall cell at its centre [m/s].
