@@ -88,6 +88,7 @@ contains
     call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
     n_begun = 0
+    first = ''
     do b = 1, merge(0, scene%n_bodies, case%grid%extent_faulty)   ! inside the tank?
       where_to = way_out(known, scene, b)
       scene%outside(b) = len(where_to) > 0
