@@ -152,10 +152,11 @@ contains
       own%face(1:2, :, n) = (1.0_wp - side_share)*face(1:2, :)
     end do
     own%face = own%face(:, :, :n)
-    own%low = minval(own%face, 2)
-    own%high = maxval(own%face, 2)
-    own%low(3, :) = 0.0_wp   ! bins are columns
-    own%high(3, :) = 0.0_wp
+    allocate (own%low(3, n), own%high(3, n), source=0.0_wp)   ! no height: bins are columns
+    do f = 1, n
+      own%low(1:2, f) = minval(own%face(1:2, :, f), 2)
+      own%high(1:2, f) = maxval(own%face(1:2, :, f), 2)
+    end do
     call bins_build(own%low, own%high, own%radius/sqrt(real(max(1, n), wp)), own%bins)
     own%low(3, :) = minval(own%face(3, :, :), 1)
   end subroutine set_lower_side
