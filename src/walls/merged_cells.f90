@@ -226,7 +226,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
-    real(wp) :: own   !! distance of the fluid of the small cell [m]
+    real(wp) :: own, fluid   !! distance of the fluid of a small cell [m], its open share
     integer :: m, n, n_known, o(3), body
     real(wp), allocatable :: most(:)
     integer :: step(3, max_targets, self%n_small)   ! from the small cells to their targets
@@ -261,11 +261,12 @@ contains
     allocate (most(0))
     do m = 1, self%n_small
       body = self%body(m)   ! the list may move as it grows
+      fluid = 1.0_wp - solid%alpha(self%cell(1, m), self%cell(2, m), self%cell(3, m))
       self%target(:, m) = 0
       do n = 1, max_targets
         o = self%cell(:, m) + step(:, n, m)
         if (self%share(n, m) <= 0.0_wp .or. .not. is_near(grid, o, n_halo)) cycle
-        call add_cell_of_most(o, body, self%share(n, m), n_known, most, self)
+        call add_cell_of_most(o, body, self%share(n, m)*fluid, n_known, most, self)
         self%target(n, m) = self%number(o(1), o(2), o(3))
       end do
     end do
