@@ -10,15 +10,14 @@ module bed_solid_m
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo
   use polygon_m, only: clip_polygon
-  use bed_m, only: bed_t, facet_within, max_clip_corners
+  use bed_m, only: bed_t, facet_within, max_clip_corners, round_off
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t
   implicit none
   private
   public :: make_bed_solid
 
-  real(wp), parameter :: min_tet = 1.0e-15_wp     !! smaller parts are dropped [cells]
-  real(wp), parameter :: round_off = 1.0e-6_wp    !! nearer to a side is in it, over the tank [-]
+  real(wp), parameter :: min_tet = 1.0e-15_wp   !! smaller parts are dropped [cells]
 
   !> Polygons of the surface, one after the other, and tetrahedra, four corners each; those of
   !! facets that look down have negative volumes.

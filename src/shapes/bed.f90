@@ -22,7 +22,7 @@ module bed_m
   private
   public :: bed_t, make_bed, set_bed, bed_counterpart, bed_place, bed_covers, bed_distance, &
     bed_is_near
-  public :: facet_within, max_clip_corners
+  public :: facet_within, max_clip_corners, round_off
 
   integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
