@@ -10,7 +10,7 @@
 !! facets lie.
 !!
 !! Lengths are in cells and counted from a whole number of cells near the body, so images in other
-!! periods and other processes get the same bits. Corners within a hundred-thousandth of a cell of a
+!! periods and other processes get the same bits. Facets within a hundred-thousandth of a cell of a
 !! grid plane are put on it, and those as near to a plane of centres beyond it: the two sides of a
 !! body that is aligned with the grid are then seen alike, whatever the last digits of its pose, and
 !! a cube that falls straight down does not spin. A corner on a plane counts as below the plane,
@@ -75,7 +75,7 @@ contains
     type(shape_t), intent(in) :: shape
     type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
-    real(wp) :: r(3, 3), centre(3), tolerance(3), x, plane
+    real(wp) :: r(3, 3), centre(3), tolerance(3), plane
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
@@ -87,16 +87,24 @@ contains
     tolerance = on_plane + 4.0_wp*epsilon(1.0_wp)*abs(centre)
     centre = centre - real(self%base, wp)
     do v = 1, n
-      do d = 1, 3
-        x = centre(d) + dot_product(r(d, :), shape%point(:, v))/grid%h(d)
-        if (abs(x - anint(x)) < tolerance(d)) x = anint(x)
-        work%point(d, v) = x
-        ! as the centres of cells see it: what lies in a plane of centres, but for a little, lies a
-        ! little beyond it, seen from the middle of the body
-        plane = floor(x) + 0.5_wp
-        if (abs(x - plane) < tolerance(d)) x = plane + sign(tolerance(d), x - centre(d))
-        work%seen(d, v) = x
-      end do
+      work%point(:, v) = centre + matmul(r, shape%point(:, v))/grid%h
+    end do
+    work%seen(:, :n) = work%point(:, :n)
+    ! facets that lie in a plane, but for a little: of the grid; of centres, which see them a little
+    ! beyond it, seen from the middle of the body
+    do m = 1, size(shape%facet) - 1
+      associate (p => shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
+        do d = 1, 3
+          plane = 0.5_wp*anint(2.0_wp*work%point(d, p(1)))
+          if (.not. all(abs(work%point(d, p) - plane) < tolerance(d))) cycle
+          if (abs(plane - anint(plane)) > 0.0_wp) then
+            work%seen(d, p) = plane + sign(tolerance(d), plane - centre(d))
+          else
+            work%point(d, p) = plane
+            work%seen(d, p) = plane
+          end if
+        end do
+      end associate
     end do
     n = size(shape%facet) - 1
     call ensure_capacity(n, work%low)

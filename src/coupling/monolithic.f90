@@ -166,7 +166,7 @@ contains
       end do
       call begin_balance(grid, self%fluid, solid, merged, flow, self%rho, balance)
       call match_densities(grid, self%rho, merged)
-      call find_slip(grid, solid, self%at_start, flow%u, merged)
+      call find_slip(grid, solid, self%at_start, s%dt, flow%u, merged)
       call store_velocity(grid, merged, flow%u, balance%before)
       call share_momentum(grid, merged, balance%mass, self%at_start, balance%before, flow%u, &
                           balance%to_wall)
@@ -253,7 +253,7 @@ contains
       ! the centres near it to rest, and seen from it as it was the mean would turn back by 1/T_c;
       ! without those forces a sphere in a narrow tube never falls steadily.
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, self%expected, u, merged)
+        call find_centres(grid, solid, self%expected, s%dt, u, merged)
         call to_centres(grid, merged, self%expected, u)
       end if
       call build_viscous(grid, solid, bodies, self%rho, s%flow%mu, s%dt, viscous, merged)

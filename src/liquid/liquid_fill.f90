@@ -348,7 +348,7 @@ contains
     real(wp), allocatable, intent(out) :: surface(:, :)   !! over the two other directions [m]
     integer :: i, j, k, axis, other(2), n(2), e(3), at(3), m
     real(wp) :: here, under, under_2, up, z
-    logical :: on_floor
+    logical :: on_floor, below_lid
     real(wp), allocatable :: all_columns(:)
 
     axis = maxloc(abs(vertical%up), 1)
@@ -367,13 +367,15 @@ contains
           under_2 = c(i - 2*e(1), j - 2*e(2), k - 2*e(3))
           z = min(up*grid%face(at(axis), axis), up*grid%face(at(axis) + 1, axis))
           on_floor = grid%beside(at(axis), merge(1, 2, up > 0.0_wp), axis)
+          below_lid = grid%beside(at(axis), merge(2, 1, up > 0.0_wp), axis)
           if (on_floor) then
-            if (here <= 0.0_wp .or. here >= 0.5_wp) cycle
-            z = z + here*grid%h(axis)
-          else
-            if (here >= 0.5_wp .or. under < 0.5_wp .or. under_2 < 0.5_wp) cycle
-            z = z + (here + under - 1.0_wp)*grid%h(axis)
+            if (here <= 0.0_wp) cycle
+            under = 1.0_wp
+            under_2 = 1.0_wp
           end if
+          if (here >= merge(1.0_wp, 0.5_wp, below_lid)) cycle   ! else in the cell above
+          if (under < 0.5_wp .or. under_2 < 0.5_wp) cycle
+          z = z + (here + under - 1.0_wp)*grid%h(axis)
           all_columns(m) = max(all_columns(m), z)
         end do
       end do

@@ -16,6 +16,7 @@ module plic_m
   public :: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
 
   real(wp), parameter :: min_component = 1.0e-13_wp   !! of a normal, relative; below it is zero
+  real(wp), parameter :: alike = 1.0e-10_wp           !! differ by round-off: shares, slopes
 
 contains
 
@@ -190,15 +191,16 @@ contains
   !> Normal of the surface on the unit cube, from liquid to gas, from the liquid shares around.
   !!
   !! Mixed Youngs-centred: of the three height functions the one whose surface is flattest, unless
-  !! the gradient of Youngs (weights 1-2-1) is less aligned with an axis. Sizes add up to one; zero
-  !! where the shares show no direction. Multiply by 1/h for the direction in space of a box cell.
+  !! the gradient of Youngs (weights 1-2-1) is less aligned with an axis; of those alike their mean
+  !! (round-off chooses none). Sizes add up to one; zero where the shares show no direction.
+  !! Multiply by 1/h for the direction in space of a box cell.
   !! Source: Aulisa, Manservisi, Scardovelli & Zaleski, J. Comput. Phys. 225 (2007).
   pure function unit_normal(c) result(m)
     real(wp), intent(in) :: c(-1:1, -1:1, -1:1)   !! liquid shares
     real(wp) :: m(3)
     real(wp) :: layer(-1:1, -1:1, 3)   !! sums over the lines of a direction
     real(wp) :: line(-1:1, 3)          !! sums over the layers normal to a direction
-    real(wp) :: tilt(3, 3), main, best, young(3)
+    real(wp) :: tilt(3, 3), flat(3), best, young(3)
     integer :: d
 
     layer(:, :, 1) = c(-1, :, :) + c(0, :, :) + c(1, :, :)
@@ -211,20 +213,23 @@ contains
     tilt(2:3, 1) = 0.5_wp*[layer(-1, 0, 1) - layer(1, 0, 1), layer(0, -1, 1) - layer(0, 1, 1)]
     tilt([1, 3], 2) = 0.5_wp*[layer(-1, 0, 2) - layer(1, 0, 2), layer(0, -1, 2) - layer(0, 1, 2)]
     tilt(1:2, 3) = 0.5_wp*[layer(-1, 0, 3) - layer(1, 0, 3), layer(0, -1, 3) - layer(0, 1, 3)]
-    best = -1.0_wp
-    m = 0.0_wp
     do d = 1, 3
       tilt(d, d) = sign(1.0_wp, line(-1, d) - line(1, d))
-      if (.not. abs(line(-1, d) - line(1, d)) > 0.0_wp) cycle
-      main = 1.0_wp/sum(abs(tilt(:, d)))
-      if (main > best) then
-        best = main
-        m = tilt(:, d)*main
-      end if
+      flat(d) = 0.0_wp
+      if (abs(line(-1, d) - line(1, d)) > alike) flat(d) = 1.0_wp/sum(abs(tilt(:, d)))
     end do
-    ! The normal of Youngs where it is less aligned with an axis.
+    best = maxval(flat)
+    m = 0.0_wp
+    do d = 1, 3
+      if (flat(d) > 0.0_wp .and. flat(d) >= (1.0_wp - alike)*best) m = m + flat(d)*tilt(:, d)
+    end do
     young = youngs(c)
-    if (sum(abs(young)) > 0.0_wp .and. (best < 0.0_wp .or. best > maxval(abs(young)))) m = young
+    associate (main => maxval(abs(young)))
+      if (main > 0.0_wp) then
+        if (main < (1.0_wp - alike)*best) m = 0.0_wp
+        if (.not. main > (1.0_wp + alike)*best .or. .not. best > 0.0_wp) m = m + young
+      end if
+    end associate
     where (abs(m) < min_component) m = 0.0_wp
     if (any(abs(m) > 0.0_wp)) m = m/sum(abs(m))
   end function unit_normal

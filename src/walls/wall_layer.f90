@@ -23,6 +23,7 @@ module wall_layer_m
     !! T_c of a centre on the wall: its velocity means nothing, the wall flux holds it
   real(wp), parameter :: max_slip = 0.5_wp
     !! s at centres, of a layer as thick as the middle of the fluid is far from the wall
+  real(wp), parameter :: at_rest = 1.0e-9_wp   !! speeds that are round-off [cells in a step]
   real(wp), parameter :: karman = 0.41_wp
   real(wp), parameter :: roughness = 2.0_wp   !! sand grains k_s of the grid [cells]
 
@@ -30,8 +31,7 @@ contains
 
   !> A velocity seen from a wall of normal n, its part along the wall and that across it scaled.
   pure function scaled_to_wall(v, n, along, across) result(scaled)
-    real(wp), intent(in) :: v(3), n(3)
-    real(wp), intent(in) :: along, across
+    real(wp), intent(in) :: v(3), n(3), along, across
     real(wp) :: scaled(3)
 
     scaled = along*v + (across - along)*dot_product(n, v)*n
@@ -69,12 +69,12 @@ contains
   end function along_share
 
   !> s at each small cell (`merged%slip`): the mean over its targets with fluid behind them, by
-  !! share times 1 - r (what lies as far out as its target says little of the layer); none in gaps
-  !! where there is no such target.
-  subroutine find_slip(grid, solid, bodies, u, merged)
+  !! share times 1 - r (what lies as far out as its target says little); none without such a one.
+  subroutine find_slip(grid, solid, bodies, dt, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
+    real(wp), intent(in) :: dt                   !! [s]
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
     type(merged_cells_t), intent(inout) :: merged
@@ -95,7 +95,7 @@ contains
           if (.not. centre_in_fluid(grid, solid, behind)) cycle
           weight = merged%share(n, m)*(1.0_wp - merged%r(n, m))
           if (weight <= 0.0_wp) cycle
-          slip = slip + weight*slip_by_two(grid, wall, merged%normal(:, m), u, c, behind, &
+          slip = slip + weight*slip_by_two(grid, dt, wall, merged%normal(:, m), u, c, behind, &
                                            merged%distance(n, m))
           weights = weights + weight
         end do
@@ -105,21 +105,20 @@ contains
     call halo_exchange(merged%slip, n_halo)
   end subroutine find_slip
 
-  !> s of the layer at a wall as cell c and the one behind it have it.
-  pure function slip_by_two(grid, wall, n, u, c, behind, distance) result(slip)
+  !> s of the layer at a wall as cell c and the one behind it have it; none in water at rest.
+  pure function slip_by_two(grid, dt, wall, n, u, c, behind, distance) result(slip)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: wall(3), n(3)   !! its velocity [m/s] and normal
+    real(wp), intent(in) :: dt, wall(3), n(3)   !! [s]; the wall's velocity [m/s] and normal
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer, intent(in) :: c(3), behind(3)
     real(wp), intent(in) :: distance   !! of the fluid of c from the wall [m]
     real(wp) :: slip
-    real(wp) :: near(3), far(3), further   !! velocities past the wall, along it
+    real(wp) :: near(3), far(3), ratio   !! velocities past the wall, along it
 
     near = scaled_to_wall(u(c(1), c(2), c(3), :) - wall, n, 1.0_wp, 0.0_wp)
     far = scaled_to_wall(u(behind(1), behind(2), behind(3), :) - wall, n, 1.0_wp, 0.0_wp)
-    further = dot_product(n, (behind - c)*grid%h)
-    slip = layer_slip(dot_product(near, far)/max(dot_product(far, far), tiny(1.0_wp)), &
-                      distance/(distance + further))
+    ratio = dot_product(near, far)/max(dot_product(far, far), sum((at_rest*grid%h/dt)**2))
+    slip = layer_slip(ratio, distance/(distance + dot_product(n, (behind - c)*grid%h)))
   end function slip_by_two
 
   !> T_c of the own cut cells with their centre in the fluid (`merged%centre`), one elsewhere: share
@@ -130,10 +129,11 @@ contains
   !! every centre that it passes: y is that of a plane wall that drags as the face coefficients of
   !! the cell do together, and no layer is taken for thinner than the middle of the fluid is far
   !! from the wall (docs/decisions/cut_cells.md).
-  subroutine find_centres(grid, solid, bodies, u, merged)
+  subroutine find_centres(grid, solid, bodies, dt, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
+    real(wp), intent(in) :: dt                   !! [s]
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
     type(merged_cells_t), intent(inout) :: merged
@@ -154,7 +154,7 @@ contains
           f = max(c, behind)
           weight = abs(n(d))*solid%aperture(f(1), f(2), f(3), d)
           if (weight <= 0.0_wp) cycle
-          slip = slip + weight*slip_by_two(grid, wall, n, u, c, behind, merged%middle(m))
+          slip = slip + weight*slip_by_two(grid, dt, wall, n, u, c, behind, merged%middle(m))
           weights = weights + weight
         end do
       end associate

@@ -15,6 +15,7 @@ contains
     call slopes()
     call slabs_add_up()
     call normals_of_planes()
+    call normals_alike()
     call normal_of_sphere()
   end subroutine test_plic
 
@@ -145,6 +146,27 @@ contains
     m = unit_normal(spread(spread(spread(0.3_wp, 1, 3), 2, 3), 3, 3))
     call check('no direction without differences', all(abs(m) <= 0.0_wp))
   end subroutine normals_of_planes
+
+  !> Level water with a rise in two cells, for which heights and Youngs slope alike: the mean of
+  !! both, whatever the last digits.
+  subroutine normals_alike()
+    real(wp), parameter :: little(3) = [0.0_wp, 1.0e-15_wp, -1.0e-15_wp], rise = 0.01_wp
+    real(wp) :: c(3, 3, 3), m(3)
+    integer :: i
+
+    do i = 1, 3
+      c(:, :, 1) = 1.0_wp
+      c(:, :, 2) = 0.1_wp
+      c(1, 1:2, 2) = 0.1_wp + rise + [little(i), -little(i)]
+      c(:, :, 3) = 0.0_wp
+      m = unit_normal(c)
+      call check('normals alike: their mean', m/m(3), [7, 1, 16]/16.0_wp*[rise, rise, 1.0_wp], &
+        1.0e-13_wp)
+      m = unit_normal(reshape(c, [3, 3, 3], order=[3, 1, 2]))
+      call check('normals alike: along another axis', m([3, 1, 2])/m(2), &
+        [7, 1, 16]/16.0_wp*[rise, rise, 1.0_wp], 1.0e-13_wp)
+    end do
+  end subroutine normals_alike
 
   !> Angle between the computed and the true normal of a sphere of radius 10 cells: second order.
   subroutine normal_of_sphere()

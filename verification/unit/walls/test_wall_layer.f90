@@ -54,6 +54,8 @@ contains
     call check('shear: linear', share(), r, 1.0e-5_wp)
     call run_along(0.0_wp, -0.2_wp)
     call check('no layer: free slip', share(), 1.0_wp, 1.0e-12_wp)
+    call run_along(0.0_wp, -0.2_wp, 1.0e-14_wp)
+    call check('as good as at rest: none', share(), r, 1.0e-5_wp)
     call run_along(1.0_wp, -0.2_wp)
     call check('one cell', share(), layer(0.15_wp, 1.0_wp)/layer(0.8_wp, 1.0_wp), 1.0e-12_wp)
   end subroutine above_the_box
@@ -96,24 +98,28 @@ contains
       box%solid%link_length(2, box%solid%link_number(4, 5, top, 3)) = given(i)
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
-      call find_centres(box%grid, box%solid, box%bodies, u, merged)
+      call find_centres(box%grid, box%solid, box%bodies, 1.0_wp, u, merged)
       call check('link', centre(), layer(counts(i), 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
     end do
   end subroutine as_the_links_pull
 
   !> A layer of thickness delta along x2, in the frame of the box at the centre of the cut cell,
   !! whose own distance from the wall is `offset` [cells].
-  subroutine run_along(delta, offset)
+  subroutine run_along(delta, offset, speed)
     real(wp), intent(in) :: delta, offset
+    real(wp), intent(in), optional :: speed   !! of the free stream, else 1
+    real(wp) :: free
     integer :: k
 
+    free = 1.0_wp + delta
+    if (present(speed)) free = speed*free
     do k = lbound(u, 3), ubound(u, 3)
       u(:, :, k, 1) = wall(1)
-      u(:, :, k, 2) = wall(2) + (1.0_wp + delta)*layer(max(0.0_wp, k - top + offset), delta)
+      u(:, :, k, 2) = wall(2) + free*layer(max(0.0_wp, k - top + offset), delta)
       u(:, :, k, 3) = wall(3) + 7.0_wp*k
     end do
-    call find_slip(box%grid, box%solid, box%bodies, u, merged)
-    call find_centres(box%grid, box%solid, box%bodies, u, merged)
+    call find_slip(box%grid, box%solid, box%bodies, 1.0_wp, u, merged)
+    call find_centres(box%grid, box%solid, box%bodies, 1.0_wp, u, merged)
   end subroutine run_along
 
   !> Of the velocity of the target that the small cell has.
