@@ -10,13 +10,13 @@
 !! facets lie.
 !!
 !! Lengths are in cells and counted from a whole number of cells near the body, so images in other
-!! periods and other processes get the same bits. Facets within a hundred-thousandth of a cell of a
-!! grid plane are put on it, and those as near to a plane of centres beyond it: the two sides of a
-!! body that is aligned with the grid are then seen alike, whatever the last digits of its pose, and
-!! a cube that falls straight down does not spin. A corner on a plane counts as below the plane,
-!! everywhere, so the lines of a face are those just above it; a facet that lies in the plane and
-!! ends the body there adds its own area. A face is therefore solid where the body touches it from
-!! either side, and full cells are closed all round.
+!! periods and other processes get the same bits. Corners that lie on a grid plane but for round-off
+!! are put on it, facets within a hundred-thousandth of a cell, too, and those as near to a plane of
+!! centres beyond it: the two sides of a body that is aligned with the grid are then seen alike,
+!! whatever the last digits of its pose, and a cube that falls straight down does not spin. A corner
+!! on a plane counts as below the plane, everywhere, so the lines of a face are those just above it;
+!! a facet that lies in the plane and ends the body there adds its own area. A face is therefore
+!! solid where the body touches it from either side, and full cells are closed all round.
 !!
 !! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron
 !! (`subcell_shares_m`): those are off by up to 0.08 of a cell. Cutting the tetrahedra themselves
@@ -34,7 +34,8 @@ module body_shares_m
   private
   public :: find_body_shares
 
-  real(wp), parameter :: on_plane = 1.0e-5_wp      !! corners so near a plane are on it [cells]
+  real(wp), parameter :: round_off = 1.0e-9_wp     !! corners so near a plane are on it [cells]
+  real(wp), parameter :: on_plane = 1.0e-5_wp      !! facets so near a plane are in it [cells]
 
 contains
 
@@ -75,7 +76,7 @@ contains
     type(shape_t), intent(in) :: shape
     type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
-    real(wp) :: r(3, 3), centre(3), tolerance(3), plane
+    real(wp) :: r(3, 3), x(3), centre(3), digits(3), tolerance(3), plane
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
@@ -84,10 +85,12 @@ contains
     r = rotation_matrix(self%q)
     centre = (self%x - grid%origin)/grid%h
     self%base = floor(centre)
-    tolerance = on_plane + 4.0_wp*epsilon(1.0_wp)*abs(centre)
+    digits = 4.0_wp*epsilon(1.0_wp)*abs(centre)
+    tolerance = on_plane + digits
     centre = centre - real(self%base, wp)
     do v = 1, n
-      work%point(:, v) = centre + matmul(r, shape%point(:, v))/grid%h
+      x = centre + matmul(r, shape%point(:, v))/grid%h
+      work%point(:, v) = merge(anint(x), x, abs(x - anint(x)) < round_off + digits)
     end do
     work%seen(:, :n) = work%point(:, :n)
     ! facets that lie in a plane, but for a little: of the grid; of centres, which see them a little
