@@ -380,6 +380,10 @@ contains
       call v%real('release_height', handling%release_height, not_negative('m'), &
         'how far above what lies below a lowered block is let go', &
         example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
+      if (handling%release /= 'set_down') call v%pass_over('swivel', &
+        'release = '//quoted_text(trim(handling%release)))
+      call v%logical('swivel', handling%swivel, 'the sling of a block that is set down holds it ' &
+        //'against tilt only: it turns freely about the vertical')
       call v%option('attitude', handling%attitude, 'given bed', 'as given, or turned from that ' &
         //'so that what is level lies on the slope of the bed below (''bed'', with a &bed)', &
         example='''given''')

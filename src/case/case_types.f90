@@ -155,6 +155,7 @@ module case_types_m
     real(wp) :: lowering_speed = 0.0_wp             !! [m/s]
     character(name_length) :: release = 'place'     !! 'place', 'height', 'touch' or 'set_down'
     real(wp) :: release_height = 0.0_wp             !! [m]
+    logical :: swivel = .false.                     !! a sling free about the vertical
     character(name_length) :: attitude = 'given'    !! 'given', or 'bed': its base on the slope
   end type handling_t
 

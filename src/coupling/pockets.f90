@@ -32,7 +32,6 @@ contains
       call global_sum(left)
       if (left(1) == changed(1)) exit
     end do
-    solid%n_sealed = int(left(1))
     if (left(1) == 0) return
     call exchange_reached(grid, solid, reached)
     do m = 1, solid%n_cut

@@ -69,7 +69,6 @@ module solid_geometry_m
     !! all round because bodies overlap there or the cell is sealed in.
     integer :: n_closed = 0
     integer, allocatable :: closed_cell(:, :)   !! (3, *)
-    integer :: n_sealed = 0                     !! cut cells of the domain that are sealed in
   end type solid_geometry_t
 
 contains
