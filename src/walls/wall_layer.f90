@@ -23,7 +23,7 @@ module wall_layer_m
     !! T_c of a centre on the wall: its velocity means nothing, the wall flux holds it
   real(wp), parameter :: max_slip = 0.5_wp
     !! s at centres, of a layer as thick as the middle of the fluid is far from the wall
-  real(wp), parameter :: at_rest = 1.0e-9_wp   !! speeds that are round-off [cells in a step]
+  real(wp), parameter :: round_off = 1.0e-9_wp   !! of weights; of speeds [cells in a step]
   real(wp), parameter :: karman = 0.41_wp
   real(wp), parameter :: roughness = 2.0_wp   !! sand grains k_s of the grid [cells]
 
@@ -99,7 +99,7 @@ contains
                                            merged%distance(n, m))
           weights = weights + weight
         end do
-        merged%slip(f(1), f(2), f(3)) = slip/max(weights, tiny(weights))
+        merged%slip(f(1), f(2), f(3)) = slip/max(weights, round_off)
       end associate
     end do
     call halo_exchange(merged%slip, n_halo)
@@ -117,7 +117,7 @@ contains
 
     near = scaled_to_wall(u(c(1), c(2), c(3), :) - wall, n, 1.0_wp, 0.0_wp)
     far = scaled_to_wall(u(behind(1), behind(2), behind(3), :) - wall, n, 1.0_wp, 0.0_wp)
-    ratio = dot_product(near, far)/max(dot_product(far, far), sum((at_rest*grid%h/dt)**2))
+    ratio = dot_product(near, far)/max(dot_product(far, far), sum((round_off*grid%h/dt)**2))
     slip = layer_slip(ratio, distance/(distance + dot_product(n, (behind - c)*grid%h)))
   end function slip_by_two
 
@@ -158,7 +158,7 @@ contains
           weights = weights + weight
         end do
       end associate
-      slip = min(max_slip, slip/max(weights, tiny(weights)))
+      slip = min(max_slip, slip/max(weights, round_off))
       merged%centre(m) = max(share_along(merged%ratio(m), slip), min_share)
     end do
   end subroutine find_centres

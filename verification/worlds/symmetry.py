@@ -90,7 +90,7 @@ def same(
 ) -> None:
     """The first steps of both worlds, in which bodies follow in steps of `step`, agree to
     round-off, if the pressure is solved so far."""
-    world = world.changed("numerics", divergence_tolerance=1e-11)
+    world = world.changed("numerics", divergence_tolerance=1e-13)
     world = world.changed("run", history_interval=0.0)
     one, other = world.run(folder / "one"), change(world, q).run(folder / "other")
     det = round(float(np.linalg.det(q)))
