@@ -52,7 +52,7 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
 .PHONY: all units everything deps run test verify mutate soak worlds bench bench-contact \
-  paper-ensemble docs reference lint clean help install install-tools FORCE
+  paper-ensemble gallery docs reference lint clean help install install-tools FORCE
 
 all: $(binary)
 
@@ -74,6 +74,7 @@ help:
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; 20 minutes.'
 	@echo '               RUNS=50; MOVES=20: besides, what moves the shares, 20 coarse runs of each'
+	@echo 'make gallery  do all that docs/gallery.md and the tutorials say, in build/gallery; 20 minutes'
 	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
 	@echo 'make docs     pages to browse, build/docs/site/index.html; every link is followed'
 	@echo 'make lint     style of the Fortran and Python sources, sizes against tools/budgets.toml'
@@ -162,7 +163,7 @@ $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(writt
 	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(written) > $@
 
 no_build := deps lint clean help install install-tools run test verify mutate soak worlds bench bench-contact \
-  paper-ensemble docs reference everything $(variants)
+  paper-ensemble gallery docs reference everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 # What a source left in the other folder when it began or ceased to use HDF5 is not to be found.
@@ -229,6 +230,12 @@ paper-ensemble:
 	@$(deps)
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) tools/paper_ensemble.py --runs $(RUNS) --moves $(MOVES)
+
+gallery:
+	@$(deps) test shape ensemble survey serve paper
+	@$(MAKE) --no-print-directory
+	@PAGES=gallery.md $(PYTHON) -m pytest -q tools/tests/test_tutorials.py -k works --basetemp build/gallery
+	@$(PYTHON) -m pytest -q tools/tests/test_tutorials.py --basetemp build/gallery/tutorials
 
 # What the program says about its own input.
 reference:

@@ -55,6 +55,7 @@ contains
     call check_landing_cube()
     call check_landing_slab()
     if (models(model) == 'spheres') call check_swinging_ball()
+    if (models(model) == 'spheres') call check_turning_is_fast()
     call check_momentum()
     call check_energy()
     if (models(model) == 'spheres') call check_constants()
@@ -94,6 +95,18 @@ contains
     end do
     call check('duration of the impact', duration, world%case%contact%contact_time, 1.0e-4_wp)
   end subroutine check_bouncing_ball
+
+  !> A cube beside the floor that only turns takes short substeps, too.
+  subroutine check_turning_is_fast()
+    type(world_t) :: still, turning
+
+    call start('', space//cube//body('cube', [0.5_wp, 0.5_wp, 0.02_wp]), still)
+    call start('', space//cube//body('cube', [0.5_wp, 0.5_wp, 0.02_wp], &
+      more='angular_velocity=0,0,1e3'), turning)
+    call move(still, 1, dt)
+    call move(turning, 1, dt)
+    call check('substeps', turning%contact%substeps > 2*still%contact%substeps)
+  end subroutine check_turning_is_fast
 
   !> Blocks that come down fast do not sink in far, and return what is asked for.
   subroutine check_fast_impact()

@@ -189,6 +189,17 @@ contains
     call check('slips', loads%force([1, 3], 3), push*[mu, 1.0_wp], 1.0e-12_wp*push)
     call check('slips on the floor', loads%force(1, 2), wall_mu*push, 1.0e-12_wp*push)
     call check('stretch', displacements%xi(1, 1:2), push/k_t*[wall_mu, mu], 1.0e-12_wp*push/k_t)
+
+    call begin(1.0_wp, 0.0_wp)
+    response%law%eta_t = 100.0_wp
+    displacements = displacements_t()
+    call detect_again([contact_point_t(2, floor, 1, normal=-z, depth=d, length=1.0_wp)], &
+      displacements)
+    displacements%xi(:, 1) = 2*wall_mu*push/k_t*x
+    counterparts%v(1, 2) = -0.1_wp
+    call sum_forces(1.0e-3_wp, displacements)
+    call check('stretch beside a dashpot', displacements%xi(1, 1), wall_mu*push/k_t, &
+      1.0e-12_wp*push/k_t)
   end subroutine check_friction
 
   !> The force belongs to the velocity in the middle of the substep, which it changes itself; the

@@ -21,6 +21,7 @@ contains
   subroutine test_contact_response()
     call make_balls()
     call check_damping()
+    call check_oblique()
     call check_limit()
     call check_load()
   end subroutine test_contact_response
@@ -44,6 +45,23 @@ contains
       call add_point(contact_point_t(a, b, t, normal=-z, depth=1.0e-6_wp), points)
     end do
   end subroutine add_ball_points
+
+  !> Two contact points along oblique normals damp the swing that they drive together.
+  subroutine check_oblique()
+    real(wp), parameter :: depth = 1.0e-6_wp, s(2) = [0.5_wp, -0.5_wp], c = sqrt(0.75_wp)
+    type(contact_points_t) :: points
+    real(wp) :: reduced, k
+    integer :: t
+
+    do t = 1, 2
+      call add_point(contact_point_t(2, 1, t, normal=[s(t), 0.0_wp, -c], depth=depth), points)
+    end do
+    call respond(points, counterparts, response)
+    reduced = 1/(1/mass(1) + 1/mass(2))
+    k = 2*c**2*response%elastic(1)/depth   ! of both along z
+    call check('damping of oblique contact points', 2*c**2*response%eta(1:2), &
+      2*response%law%damping_ratio*sqrt(k*reduced), 1.0e-6_wp*sqrt(k*reduced))
+  end subroutine check_oblique
 
   !> One contact point damps with the ratio of the law, and so do many together.
   subroutine check_damping()
