@@ -204,10 +204,12 @@ contains
       more='release_time=9')//place((other + 1)/2), one, two)
     call run(1.0_wp, one, two)
     call check('sleeps', one%blocks%asleep(sleeper))
-    call check('on the floor alone', all([one%blocks%contacts(sleeper), one%blocks%on_floor(sleeper)] == 1))
+    call check('on the floor alone', all([one%blocks%contacts(sleeper), &
+      one%blocks%on_floor(sleeper)] == 1))
     call release_body(1.0_wp, other, one%blocks)
     call release_body(1.0_wp, other, two%blocks)
-    call check('energy of the rest', kinetic_energy(one%blocks), one%blocks%mass(other)/8, 1.0e-15_wp)
+    call check('energy of the rest', kinetic_energy(one%blocks), one%blocks%mass(other)/8, &
+      1.0e-15_wp)
     dropped = 0.0_wp
     do n = 1, 10
       before = momentum(one)
