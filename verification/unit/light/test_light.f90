@@ -26,6 +26,7 @@ contains
     call check_start()
     call check_terminal()
     call check_in_balance()
+    call check_draught()
     call check_entry()
     call check_let_go()
     call check_spin()
@@ -187,6 +188,21 @@ contains
     call check('and no other way', norm2(world%blocks%v(2:3, 1)) < 1.0e-12_wp)
   end subroutine check_in_balance
 
+  !> An upright cube is dragged along by as much as its sides are wet.
+  subroutine check_draught()
+    real(wp), parameter :: draught(2) = [1.0_wp, 0.3_wp], along(3) = [0.1_wp, 0.0_wp, 0.0_wp]
+    type(world_t) :: world
+    real(wp) :: force(2)
+    integer :: i
+
+    do i = 1, 2
+      call start(2300.0_wp, world, at(level + (0.5_wp - draught(i))*edge, along))
+      call enter(gravity, world)
+      force(i) = world%light%force(1, 1)
+    end do
+    call check('drag of a part', force(2)/force(1), draught(2), 1.0e-3_wp)
+  end subroutine check_draught
+
   !> Entry without weight and drag: U (M + A)^e stays, however many steps it takes.
   subroutine check_entry()
     type(world_t) :: world
@@ -196,7 +212,7 @@ contains
 
     do n = 40, 400, 360
       call start(2300.0_wp, world, at(level + 0.6_wp*edge, [0.0_wp, 0.0_wp, fall]), &
-        shape=' drag_coefficient=0')
+        shape=' drag_coefficient=0', velocity=' velocity=.2,0,0')
       do i = 1, n
         call enter(0.0_wp*gravity, world)
         call drift(1.2_wp*edge/real(n, wp)/0.4_wp, world%blocks)
@@ -204,6 +220,8 @@ contains
       call enter(0.0_wp*gravity, world)
       want = fall*(own_mass(world%blocks, 1)/world%blocks%mass(1))**1.2_wp
       call check('entry takes momentum', world%blocks%v(3, 1)/want, 1.0_wp, 1.0e-12_wp)
+      call check('the current gives some', world%blocks%v(1, 1), 0.2_wp*(1.0_wp - want/fall), &
+        1.0e-12_wp)
     end do
     call check('all of it is in the water', world%light%wet(1)/edge**3, 1.0_wp, 1.0e-12_wp)
     world%blocks%x(3, 1) = level + edge
