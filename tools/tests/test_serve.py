@@ -667,7 +667,7 @@ def test_a_case_is_edited_run_stopped_and_reported(case: Path, browser: Browser)
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
         fields = "document.querySelectorAll('#form select, #form input')"
         assert browser.run(f"{fields}[0].id") == "run-0-physics"
-        assert "placing by crane, many repeats" in browser.run(f"{field('form')}.textContent")
+        assert "40 units: ten seconds" in browser.run(f"{field('form')}.textContent")
         type_into(browser, "shape-0-size", "big")
         until(lambda: browser.run(VERDICT).startswith("Refused"))
         assert "number" in browser.run(f"{field('shape-0-size-wrong')}.textContent")

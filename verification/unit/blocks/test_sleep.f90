@@ -194,15 +194,15 @@ contains
   subroutine check_hit(sleeper, other)
     integer, intent(in) :: sleeper, other   !! their places in the case
     type(world_t) :: one, two
-    character(200) :: place(2)
+    character(200) :: place(3)
     real(wp) :: before(3), dropped
     integer :: n
 
-    place(1) = tower(1, 1)
-    place(2) = body('cube', [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d], [0.5_wp, 0.0_wp, 0.0_wp], &
+    place(sleeper) = tower(1, 1)
+    place(2) = body('cube', [0.5_wp, 0.5_wp, 1.5_wp*d], more='release_time=9')
+    place(other) = body('cube', [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d], [0.5_wp, 0.0_wp, 0.0_wp], &
       more='release_time=1')
-    call start(place((sleeper + 1)/2)//body('cube', [0.5_wp, 0.5_wp, 1.5_wp*d], &
-      more='release_time=9')//place((other + 1)/2), one, two)
+    call start(place(1)//place(2)//place(3), one, two)
     call run(1.0_wp, one, two)
     call check('sleeps', one%blocks%asleep(sleeper))
     call check('on the floor alone', all([one%blocks%contacts(sleeper), &

@@ -124,8 +124,9 @@ contains
       blocks%q(:, 1) = draw_attitude()
       if (mod(p, 8) == 0) blocks%q(:, 1) = quarter_turns(p/8)
       if (mod(p, 4) == 2) then   ! a corner alone next to a plane
-        x = blocks%x(1, 1)/grid%h(1) + dot_product([1, 0, 0], &
-          matmul(rotation_matrix(blocks%q(:, 1)), blocks%shapes(1)%point(:, 1)))/grid%h(1)
+        associate (r => rotation_matrix(blocks%q(:, 1)), point => blocks%shapes(1)%point(:, 1))
+          x = (blocks%x(1, 1) + dot_product(r(1, :), point))/grid%h(1)
+        end associate
         blocks%x(1, 1) = blocks%x(1, 1) + (anint(x) + 5.0e-6_wp - x)*grid%h(1)
       end if
       call update_solid(fraction, grid, blocks, solid)
