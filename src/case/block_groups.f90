@@ -54,7 +54,7 @@ contains
       example='0.5')
     call v%real('contact_time', contact%contact_time, positive('s'), &
       'how long such an impact lasts, less where restitution is below 0.135; shorter makes ' &
-      //'blocks stiffer. With any law a step of the blocks is a twentieth of it at most', &
+      //'blocks stiffer. With springs a step of the blocks is a twentieth of it at most', &
       example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
       //'with '//law//', of each pair of spheres', example=spheres//law//'  k_n = 2e5')

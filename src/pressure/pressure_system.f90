@@ -215,7 +215,7 @@ contains
     select case (trim(self%preconditioner))
     case ('multigrid'); call solve_with(self%solver%multigrid)
     case ('jacobi'); call solve_with(self%jacobi)
-    case default; call solve_with(identity)   ! 'none', as `require_names` has made sure
+    case default; call solve_with(identity)   ! 'none', as `pressure_system_init` has made sure
     end select
   contains
     subroutine solve_with(preconditioner)
