@@ -50,7 +50,7 @@ contains
     real(wp) :: courant
 
     if (.not. sim%start_converged) call set_fault(sim, &
-      'the flow of the start did not converge', fault)
+      'the flow at the start or at a release did not converge', fault)
     if (report%contact%info /= 0) call set_fault(sim, 'a step would need more than a million ' &
       //'body steps: blocks are too fast, or `contact_time` or `substep_ratio` too small', fault)
     if (sim%wet) then
@@ -90,7 +90,7 @@ contains
     integer :: b
 
     do b = 1, sim%blocks%n
-      if (.not. fault%there(b)) cycle
+      if (.not. fault%there(b) .or. sim%blocks%fixed(b)) cycle
       associate (dt => sim%clock%dt, v => norm(sim%blocks%v(:, b)))
         moved = norm(sim%blocks%x(:, b) - fault%place(:, b))
         explained = dt*(fault%speed(b) + v + dt*norm(sim%case%fluid%gravity)) &

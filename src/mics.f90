@@ -16,7 +16,7 @@ program mics
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use case_types_m, only: case_t
   use case_input_m, only: read_case
-  use named_files_m, only: read_case_text, look_beside
+  use named_files_m, only: read_case_text, look_beside, found_file
   use placing_table_m, only: read_places
   use motion_file_m, only: read_motions
   use reference_m, only: reference_text
@@ -36,7 +36,7 @@ program mics
   use simulation_m, only: simulation_t, simulation_init, resume, measure
   use step_m, only: take_step, measure_overlap
   use faults_m, only: fault_t, store_places, find_fault, set_fault
-  use release_m, only: n_pending
+  use release_m, only: are_waiting
   implicit none
   save   ! keeps the state off the stack
   type(options_t) :: options
@@ -69,6 +69,7 @@ program mics
   call open_output(case, parameters, options, sim%run_state_t, bed, output)
   if (output%code /= exit_ok) call fatal(output%code, output%message)   ! what was written stays
   call measure(sim, report)
+  call measure_overlap(sim, report)
   ! of a run that goes on, what was due has been written
   if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
   stop_requests = stop_requests_t('', options%max_wall, began, last=wall_clock())
@@ -81,7 +82,7 @@ program mics
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)
   end do
-  waiting = n_pending(sim%clock%t, sim%blocks)
+  waiting = count(are_waiting(sim%clock%t, sim%blocks))
   if (sim%clock%finished() .and. waiting > 0) then
     message = ''
     if (sim%clock%settled()) message = ', and all others are at rest'
@@ -151,6 +152,9 @@ contains
       call name_folder(case, options, what, path)
       call check_folder(what, path, code, message)
       if (code /= exit_ok) call problems%add_message(message)
+      if (any(index([character(4096) :: found_file(case%start%file), &
+        found_file(case%fluid%initial_state)], path//'/') == 1)) call problems%add(what, path, &
+        'would be renamed with the file that &start or &fluid initial_state names; take another')
     end if
     there = .false.
     if (len(options%plan) > 0) inquire (file=options%plan, exist=there)

@@ -29,7 +29,7 @@ module simulation_m
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
   use energy_m, only: energy_parts_t, energy_init, put_in_energy, energy_excess
   use coupling_m, only: coupling_t, copy_motion
-  use light_m, only: light_init, resume_light
+  use light_m, only: light_init, load_block
   use monolithic_m, only: monolithic_t, monolithic_init
   use mass_average_m, only: mass_average_t, mass_average_init
   use flow_start_m, only: start_flow
@@ -53,9 +53,8 @@ module simulation_m
     type(overlap_t) :: overlap
     type(deep_overlaps_t) :: deep
     logical :: wet = .true.                !! there is a flow of water and air
-    logical :: start_converged = .true.    !! velocity and pressure at t = 0
+    logical :: start_converged = .true.    !! flow at t = 0 and at releases
     logical, allocatable :: initialised(:)        !! blocks whose motion in the fluid has begun
-    logical, allocatable :: pending(:)     !! blocks that are due, found no room and were warned of
   end type simulation_t
 
 contains
@@ -86,7 +85,7 @@ contains
     call choose_contact(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
-    allocate (sim%pending(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)
+    allocate (sim%initialised(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (case%run%physics == 'light') call light_init(case, bed, sim%blocks, sim%light)
     if (.not. sim%wet) return
@@ -124,7 +123,8 @@ contains
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call start_flow(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, case%run%dt), &
                     sim%coupling, sim%start_converged)
-    call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
+    call start_outflow(sim%grid, case%fluid, sim%solid%alpha, sim%flow%c, sim%flow%uf, &
+                       sim%flow%sides)
   end subroutine simulation_init
 
   !> The contact solver of a case.
@@ -167,12 +167,12 @@ contains
     where (sim%blocks%handling%lowering_speed > 0.0_wp) sim%blocks%fixed = &
       sim%blocks%status == lowering
     do b = 1, sim%blocks%n
-      if (.not. hangs(b, sim%blocks)) cycle
-      sim%blocks%fixed(b) = .false.
-      call brace(sim%clock%dt, b, sim%blocks)
+      if (hangs(b, sim%blocks)) sim%blocks%fixed(b) = .false.
+      if (sim%light%on .and. sim%clock%step > 0 .and. sim%blocks%present(b) &
+          .and. .not. sim%blocks%fixed(b)) call load_block(b, sim%light, sim%blocks)
+      if (hangs(b, sim%blocks)) call brace(sim%clock%dt, b, sim%blocks)
     end do
     if (sim%clock%step > 0) sim%initialised = sim%blocks%present
-    if (sim%light%on .and. sim%clock%step > 0) call resume_light(sim%blocks, sim%light)
     if (.not. sim%wet) return
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_velocity_halo(sim%grid, sim%flow%u)

@@ -132,7 +132,8 @@ contains
     sim%clock%step = sim%clock%step + 1
     call describe(sim, report)
     report%overlap_known = .false.
-    if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%finished()) then
+    if (sim%clock%rows%due(sim%clock%t) .or. sim%clock%frames%due(sim%clock%t) &
+        .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
     else if (sim%contacts%exact) then
       call tic('blocks')   ! for warnings and faults only where bodies have deep contacts
@@ -163,7 +164,7 @@ contains
     type(step_report_t), intent(inout) :: report
     logical :: any_free, all_there   ! nothing else moves or is to come, but for lack of room
 
-    any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
+    any_free = .not. all(sim%blocks%fixed)
     call update_record(sim%clock%t, sim%clock%dt, sim%case%run%rest_speed, sim%blocks)
     all_there = any_free .and. nothing_to_come(sim%clock%t, sim%blocks)
     if (.not. all_there .or. maxval(sim%blocks%speed) >= sim%case%run%rest_speed) then
@@ -181,8 +182,8 @@ contains
     report%curvature_fallback = sim%coupling%tension%surface%fallback
   end subroutine describe
 
-  !> Blocks that have passed an open side go; those whose time has come enter, with the force and
-  !! the pressure with which they begin to move.
+  !> Blocks whose time has come enter, with the force and the pressure with which they begin to
+  !! move; then those that have passed an open side go, whose place the fluxes fill.
   subroutine release(sim, report, next_let_go)
     type(simulation_t), intent(inout), target :: sim
     type(step_report_t), intent(inout) :: report
@@ -191,20 +192,19 @@ contains
     logical :: released
 
     call follow_motions(sim%clock%t, sim%blocks)
-    call take_out(sim%grid, sim%case%fluid%gravity, sim%clock%t, sim%blocks)
-    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%pending, &
-                            report%warnings, released)
-    call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
-                        next_let_go, report%warnings)
-    if (.not. sim%wet) return
-    if (released) then   ! the liquid in their place raises the free surface
+    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, report%warnings, &
+                            released)
+    call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%case%run%dt, &
+                        sim%overlap, sim%blocks, next_let_go, report%warnings)
+    if (sim%wet .and. released) then   ! the liquid in their place raises the free surface
       call voxelise(sim)
       call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
       call mix_fluid(sim%case%fluid, sim%flow)
       fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
       call put_in_energy(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
     end if
-    if (any(sim%blocks%present .and. .not. sim%initialised)) call first_forces(sim)
+    if (sim%wet .and. any(sim%blocks%present .and. .not. sim%initialised)) call first_forces(sim)
+    call take_out(sim%grid, sim%case%fluid%gravity, sim%clock%t, sim%blocks)
   end subroutine release
 
   !> A block that has just appeared gets the force of a fluid at rest in which it is let go; one
@@ -225,6 +225,7 @@ contains
       end do
       call sim%coupling%force_at_release(stage_t(sim%grid, sim%solid, sim%flow, sim%scratch, &
         sim%case%run%dt), begins .and. .not. stand, force)
+      sim%start_converged = sim%start_converged .and. sim%coupling%pressure%report%converged
       do b = 1, blocks%n
         if (.not. begins(b)) cycle
         blocks%fluid_force(:, b) = force(1:3, b)
@@ -287,7 +288,7 @@ contains
       if (rate%has_surface) then
         h = sim%grid%min_spacing()
         allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h), &
-          viscous_step(sim%case%fluid, sum(1.0_wp/sim%grid%h**2, sim%grid%n > 1)))
+          viscous_step(sim%case%fluid, sim%grid%inverse_h2))
       end if
     end if
     call sim%clock%choose_step(allowed, min(next_let_go, next_release(sim%clock%t, sim%blocks)))

@@ -31,10 +31,12 @@ def run(work: Path, case: str, table: str) -> h5py.File:
     return h5py.File(work / "mics-out" / "run.h5")
 
 
-def test_a_plate_pushes_a_cube(tmp_path: Path) -> None:
+@pytest.mark.parametrize("physics", ["dry", "light"])
+def test_a_plate_pushes_a_cube(physics: str, tmp_path: Path) -> None:
     """Half way at half its time, through its rows, held at the end; the cube lies before it."""
     table = "time,x,y,z\n0.1,0.02,0.04,0.03\n0.9,0.08,0.04,0.03\n"
-    case = DRY.format(end=1.2) + PLATE + MOVED.format(more="") + CUBE
+    case = DRY.format(end=1.2).replace("dry", physics) + PLATE + MOVED.format(more="") + CUBE
+    case += "&fluid water_level = 0.001 /\n"
     with run(tmp_path, case, table) as h5:
         time, x, v = (h5[f"bodies/{name}"][:] for name in ("time", "position", "velocity"))
         s = np.clip((time - 0.1) / 0.8, 0, 1)
@@ -133,8 +135,9 @@ def test_restart_changes_no_bit(physics: str, tmp_path: Path) -> None:
     (tmp_path / "way.csv").write_text(DOOR)
     assert shared_runs.after_restart(tmp_path, case) == []
     older = f"whole/{Run(tmp_path / 'whole').restart_files[0]}"
-    other = DOOR.replace("0.07,", "0.071,")
-    done = mics(tmp_path, case, other, "--restart", older, "--output", "third")
+    done = mics(
+        tmp_path, case, DOOR.replace("0.07,", "0.071,"), "--restart", older, "--output", "third"
+    )
     assert done.returncode == 2 and "motion" in done.stderr, done.stderr
 
 

@@ -255,7 +255,9 @@ def test_set_down_on_a_slope(tmp_path: Path) -> None:
         assert (steep in mics(["--check", case], tmp_path).stdout) == (mu < 0.5)
 
 
-@pytest.mark.parametrize("release", ["touch", "set_down"])
+@pytest.mark.parametrize(
+    "release", ["touch", "set_down", "set_down'  swivel = T  if_blocked = 'wait"]
+)
 def test_lowered_in_water_and_again_after_a_restart(release: str, tmp_path: Path) -> None:
     """The flow meets the held block as a moving body; a restart in the middle changes no bit."""
     drop = (

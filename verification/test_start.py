@@ -12,19 +12,17 @@ from shared_runs import mics, texts
 
 GRID = "&grid cells = 12, 4, 12  length = 0.24, 0.08, 0.24 /\n"
 CUBE = "&shape name = 'cube'  kind = 'cube'  size = 0.03 /\n"
-THREE = (
-    "&body shape = 'cube'  position = 0.2, 0.04, 0.1  fixed = T /\n"
-    "&drop shape = 'cube'  position = 0.06, 0.04, 0.2  count = 3  interval = 0.2 /\n"
-)
+DROP = "&drop shape = 'cube'  position = 0.06, 0.04, 0.2  count = 3  interval = 0.2 /\n"
+THREE = "&body shape = 'cube'  position = 0.2, 0.04, 0.1  fixed = T /\n" + DROP
 FILL = "&run t_end = 0.5  dt = 0.01  physics = 'dry'  output = 'fill'  field_interval = 0 /\n"
 THEN = "&run t_end = 0.1  dt = 0.01  physics = 'dry'  output = 'then'  field_interval = 0 /\n"
 
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a dry run of three dropped cubes beside a held one."""
+    """A folder with a dry run of three dropped cubes beside a held one; others find no room."""
     folder = tmp_path_factory.mktemp("filled")
-    done = mics(folder, FILL + GRID + CUBE + THREE)
+    done = mics(folder, FILL + GRID + CUBE + THREE + DROP.replace("/", "if_blocked = 'skip' /"))
     assert done.returncode == 0, done.stderr
     return folder
 

@@ -116,8 +116,8 @@ contains
     integer :: a, b, p, w
 
     do b = 1, blocks%n
-      if (.not. blocks%present(b) .or. (blocks%still(b) .and. btest(self%state(b), 0))) cycle
-      if (all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)) cycle
+      if (.not. blocks%present(b)) cycle
+      if (all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)) cycle   ! as when it was last here
       self%q(:, b) = blocks%q(:, b)
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do

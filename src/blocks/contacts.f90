@@ -2,7 +2,7 @@
 module contacts_m
   use kinds_m, only: wp
   use vectors_m, only: norms
-  use rigid_body_m, only: blocks_t, begin_step, hold_sleepers, look_ahead, follow_motions, &
+  use rigid_body_m, only: blocks_t, hold_sleepers, look_ahead, follow_motions, &
     fastest_point
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_counterpart
@@ -62,7 +62,8 @@ contains
     logical :: changed
     integer :: b
 
-    call begin_step(blocks)
+    blocks%v_start = blocks%v
+    blocks%l_start = blocks%l
     call look_ahead(dt, blocks)
     associate (share => contacts%share)
       do b = 1, blocks%n

@@ -2,7 +2,7 @@
 module counterparts_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
-  use rigid_body_m, only: blocks_t, space_tensor
+  use rigid_body_m, only: blocks_t, space_tensor, let_go
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
   implicit none
@@ -68,7 +68,8 @@ contains
     integer :: w, b
 
     counterparts%gravity = norm(gravity)
-    counterparts%heaviest = max(0.0_wp, maxval(blocks%mass, .not. blocks%fixed))
+    counterparts%heaviest = max(0.0_wp, maxval(blocks%mass, &
+      .not. blocks%fixed .and. blocks%status <= let_go))   ! left out ones never touch
     do w = 1, walls%n
       counterparts%v(:, walls%number(w)) = walls%velocity(:, w)
     end do

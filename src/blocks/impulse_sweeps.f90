@@ -25,6 +25,7 @@
 module impulse_sweeps_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
+  use parallel_m, only: get_threads
   use impulse_rows_m, only: row_t, rows_t, past, in_space
   implicit none
   private
@@ -249,15 +250,17 @@ contains
     type(rows_t), intent(inout) :: rows
     real(wp), intent(out) :: change       !! largest, of a velocity [m/s]
     real(wp) :: most
-    integer :: i, c, m, last
+    integer :: i, c, m, last, chunk
 
     change = 0.0_wp
     last = rows%n_colours
-    !$omp parallel private(i, c, m, most) if (rows%n > worth_threads)
+    !$omp parallel private(i, c, m, chunk, most) if (rows%n > worth_threads)
     most = 0.0_wp
     do i = 1, last
       c = merge(last + 1 - i, i, backward)
-      !$omp do schedule(static)
+      chunk = rows%begin(c + 1) - rows%begin(c)   ! pairs of the last of all may share a body
+      if (c < size(rows%begin) - 1) chunk = chunk/get_threads() + 1
+      !$omp do schedule(static, chunk)
       do m = rows%begin(c), rows%begin(c + 1) - 1
         call solve_pair(bias, backward, rows%order(m), rows, most)
       end do

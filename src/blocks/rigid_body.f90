@@ -16,7 +16,7 @@ module rigid_body_m
   private
   public :: blocks_t, record_t, release_body, body_text
   public :: to_come, lowering, let_go, left_out, out
-  public :: begin_step, drift, drift_body, angular_velocity, kick, kick_body, place_body
+  public :: drift, drift_body, angular_velocity, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
   public :: follow_motions, look_ahead, change_by_motion, haste, are_driven
@@ -199,14 +199,6 @@ contains
     inertia = space_tensor(blocks%q(:, b), blocks%shapes(blocks%shape(b))%inertia)
     blocks%l(:, b) = matmul(inertia, blocks%omega(:, b))
   end subroutine set_momentum
-
-  !> Remember v and l at the start of a fluid step.
-  pure subroutine begin_step(blocks)
-    type(blocks_t), intent(inout) :: blocks
-
-    blocks%v_start = blocks%v
-    blocks%l_start = blocks%l
-  end subroutine begin_step
 
   !> Move the bodies for a time dt with their present v and l; fixed bodies at their given rates.
   pure subroutine drift(dt, blocks)

@@ -6,7 +6,7 @@
 !! carries something; s is how much longer it is than at rest. It gives way by a share e of the
 !! smallest edge d under the weight W. Its force T acts at the radius a of the block above the
 !! centre, along the body axis u that pointed up (z) when the block began to hang. Force and torque
-!! are those of the end of the step, so that any step is stable; a swivel has no C about z:
+!! are those of the end of the step, so that any step is stable; a swivel has no C about u:
 !!
 !! $$ T = k s + c \dot s \ge 0, \quad k = W/(e d), \quad c = 2 \sqrt{k M}, $$
 !! $$ M_T = K u \times z - C \omega, \quad K = T a, \quad C = 2 \sqrt{K I} . $$
@@ -82,15 +82,14 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
-    real(wp) :: inertia(3, 3), more, turn(3, 3), free(3)   ! free: z of the body that turns freely
+    real(wp) :: inertia(3, 3), more, free(3)   ! free: axis of the body that turns freely
     integer :: d
 
     inertia = blocks%shapes(blocks%shape(b))%inertia
     associate (k => lever(b, blocks))
       more = dt*2*sqrt(k*(inertia(1, 1) + inertia(2, 2) + inertia(3, 3))/3) + dt**2*k
     end associate
-    turn = rotation_matrix(blocks%q(:, b))
-    free = merge(turn(3, :), 0.0_wp, blocks%handling(b)%swivel)
+    free = merge(blocks%upright(:, b), 0.0_wp, blocks%handling(b)%swivel)
     do d = 1, 3
       inertia(d, d) = inertia(d, d) + more
       inertia(:, d) = inertia(:, d) - more*free(d)*free

@@ -138,8 +138,8 @@ contains
         call give(s%scratch, self%tension%force)
       else
         call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
-        call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, self%bodies, &
-                             s%dt, a, flow%p)
+        call advect_pressure(grid, fluid%liquid_density*merge(0.0_wp, fluid%gravity, &
+                             grid%periodic), solid%alpha, self%bodies, s%dt, a, flow%p)
         call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
         call find_first_half(grid, solid, self%merged_before, self%bodies, &
                              self%extrapolated/s%dt, flow%rho, a)

@@ -20,14 +20,14 @@ module release_m
   use moments_m, only: has_come
   use grid_m, only: grid_t
   use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, &
-    left_out, out
+    let_go, left_out, out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, has_place, exclude
   use sling_m, only: hang, hangs, let_off, slack_share, slows_at
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
-  public :: release_due_blocks, let_go_lowered, next_release, n_pending, nothing_to_come
+  public :: release_due_blocks, let_go_lowered, next_release, are_waiting, nothing_to_come
   public :: take_out
 
 contains
@@ -36,23 +36,24 @@ contains
   !!
   !! Of blocks that are due at the same time and whose places exclude one another those go that
   !! leave room to most others, so that many go together.
-  subroutine release_due_blocks(walls, time, overlap, blocks, pending, warnings, released)
+  subroutine release_due_blocks(walls, time, overlap, blocks, warnings, released)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: time   !! [s]
     type(overlap_t), intent(in) :: overlap
     type(blocks_t), intent(inout) :: blocks
-    logical, intent(inout) :: pending(:)     !! blocks warned of
     integer, intent(inout) :: warnings       !! counted up
     logical, intent(out) :: released         !! there was one
     integer, allocatable :: due(:)
     logical, allocatable :: free(:)
-    real(wp) :: place   !! height [m]
+    logical :: waiting(blocks%n)   ! they were warned of
+    real(wp) :: given(blocks%n), place   ! heights: of the case, and above what lies there [m]
     integer :: b, i
 
     released = .false.
-    if (blocks%n == 0) return
     if (.not. any(is_due(time, blocks))) return
     due = pack([(b, b=1, blocks%n)], is_due(time, blocks))
+    waiting = are_waiting(time, blocks)
+    given = blocks%x(3, :blocks%n)
     allocate (free(size(due)))
     do i = 1, size(due)
       call check_place(walls, overlap, due(i), blocks, free(i))
@@ -70,20 +71,18 @@ contains
           blocks%raised(b) = blocks%x(3, b) - place
           call warn(time, b, 'was raised by '//brief(blocks%raised(b), 3) &
             //' m, its place is taken', blocks, warnings)
-        else
-          blocks%x(3, b) = place
         end if
       end if
+      if (.not. free(i)) blocks%x(3, b) = given(b)
       if (free(i)) then
-        if (pending(b)) call warn(time, b, 'found room and was released', blocks, warnings)
+        if (waiting(b)) call warn(time, b, 'found room and was released', blocks, warnings)
         call release_body(time, b, blocks)
         released = .true.
       else if (blocks%handling(b)%if_blocked == 'skip') then
         call warn(time, b, 'is left out, its place is taken', blocks, warnings)
         blocks%status(b) = left_out
-      else if (.not. pending(b)) then
+      else if (.not. waiting(b)) then
         call warn(time, b, 'is due but its place is taken; it waits', blocks, warnings)
-        pending(b) = .true.
       end if
     end do
   end subroutine release_due_blocks
@@ -127,10 +126,10 @@ contains
 
   !> Let go the lowered blocks that are where they should be, and find when the next of them will be
   !! if nothing changes.
-  subroutine let_go_lowered(walls, gravity, time, overlap, blocks, next, warnings)
+  subroutine let_go_lowered(walls, gravity, time, dt, overlap, blocks, next, warnings)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)        !! [m/s2]
-    real(wp), intent(in) :: time              !! [s]
+    real(wp), intent(in) :: time, dt          !! [s], of the longest step
     type(overlap_t), intent(in) :: overlap
     type(blocks_t), intent(inout) :: blocks
     real(wp), intent(out) :: next             !! huge if there is none [s]
@@ -148,8 +147,9 @@ contains
           call let_off(carried, time, b, blocks)
           cycle
         end if
-        gap = merge(slows_at, ground_gap, handling%release == 'set_down') &
-          *blocks%shapes(blocks%shape(b))%smallest_edge
+        gap = ground_gap*blocks%shapes(blocks%shape(b))%smallest_edge
+        if (handling%release == 'set_down') gap = max(handling%lowering_speed*dt, &
+          slows_at*blocks%shapes(blocks%shape(b))%smallest_edge)
         way = way_down(walls, blocks, b, overlap)
         left = way
         if (handling%release == 'height') left = max(0.0_wp, way - handling%release_height)
@@ -159,7 +159,8 @@ contains
         if (time > blocks%entry_time(b) .and. blocks%contact_force(3, b) > 0.0_wp &
             .and. carried < slack_share*weight) left = 0.0_wp
         if (left > gap) then
-          if (left < nothing_below) next = min(next, time + left/handling%lowering_speed)
+          if (left < nothing_below) next = min(next, &   ! the step ends within the gap
+            time + (left - 0.9_wp*gap)/handling%lowering_speed)
           cycle
         end if
         if (handling%release == 'set_down') then
@@ -227,7 +228,7 @@ contains
     end function same_moment
   end subroutine order_due
 
-  !> Take the free blocks out whose centre of mass has passed an open side: they keep the place and
+  !> Take the free and the lowered blocks out whose centre of mass has passed an open side: they keep the place and
   !! the speed of then, displace nothing and touch nothing any more. The fluxes of the step bring
   !! fluid into the space that opens.
   subroutine take_out(grid, gravity, time, blocks)
@@ -239,7 +240,8 @@ contains
     integer :: b, d
 
     do b = 1, blocks%n
-      if (.not. blocks%present(b) .or. blocks%fixed(b)) cycle
+      if (.not. blocks%present(b)) cycle
+      if (blocks%fixed(b) .and. blocks%status(b) /= lowering) cycle
       passed = .false.
       do d = 1, 3
         associate (x => blocks%x(d, b) - grid%origin(d))
@@ -256,6 +258,7 @@ contains
       blocks%fluid_torque(:, b) = 0.0_wp
       blocks%lagged_force(:, b) = 0.0_wp
       blocks%film_force(:, b) = 0.0_wp
+      blocks%sling(b) = 0.0_wp
       if (is_root()) write (error_unit, '(a)') 'mics: t = '//brief(time, 6)//' s: ' &
         //body_text(b, blocks)//' is out: it passed an open side at ('//to_text(blocks%x(:, b)) &
         //') m with '//brief(norm(blocks%v(:, b)))//' m/s'
@@ -274,17 +277,16 @@ contains
                   .and. .not. has_come(blocks%release_time, time))
   end function next_release
 
-  !> Number of blocks whose time came before this moment but whose place was taken; one that is due
-  !! at this very moment has not been tried.
-  pure function n_pending(time, blocks) result(n)
+  !> Of which blocks the time came before this moment but the place was taken. One that is due at
+  !! this very moment has not been tried.
+  pure function are_waiting(time, blocks) result(yes)
     real(wp), intent(in) :: time   !! [s]
     type(blocks_t), intent(in) :: blocks
-    integer :: n
+    logical :: yes(blocks%n)
 
-    n = 0
-    if (blocks%n > 0) n = count(blocks%status == to_come .and. .not. blocks%present &
-                                .and. .not. has_come(time, blocks%release_time))
-  end function n_pending
+    yes = blocks%status == to_come .and. .not. blocks%present &
+          .and. .not. has_come(time, blocks%release_time)
+  end function are_waiting
 
   !> Does nothing but the free blocks move from now on? Every block is let go, left out, or tried
   !! before this moment and without room (once all blocks rest nobody makes room any more), no fixed
@@ -295,8 +297,7 @@ contains
     logical :: yes
     integer :: b
 
-    yes = count(blocks%status == to_come .and. .not. blocks%present) == n_pending(time, blocks) &
-      .and. .not. any(blocks%status == lowering)
+    yes = all(blocks%status >= let_go .or. are_waiting(time, blocks))
     do b = 1, blocks%n
       if (.not. blocks%fixed(b)) cycle
       associate (path => blocks%path(b))

@@ -33,6 +33,7 @@ module grid_m
     real(wp) :: h(3) = 0.0_wp     !! spacing [m]
     real(wp) :: volume = 0.0_wp   !! of a cell [m3]
     real(wp) :: area(3) = 0.0_wp  !! of a face normal to each direction [m2]
+    real(wp) :: inverse_h2 = 0.0_wp   !! sum of 1/h^2, of directions with several cells [1/m2]
   contains
     procedure :: own => grid_own
     procedure :: face => grid_face
@@ -64,6 +65,7 @@ contains
     grid%h = input%length/real(input%cells, wp)
     grid%volume = product(grid%h)
     grid%area = grid%volume/grid%h
+    grid%inverse_h2 = sum(1.0_wp/grid%h**2, grid%n > 1)   ! the width of a slice says nothing
     grid%side_velocity = boundary%velocity
     do d = 1, 3
       do s = 1, 2

@@ -5,7 +5,7 @@
 !! $$ p = \int \rho g\,dz + C \rho_l [\, c (u - \bar u) - g (\eta - \eta_0)\, ], \quad
 !!    c = \sqrt{g H} $$
 !! u is the outward velocity of the face, eta the level of the last column of cells, eta_0 the given
-!! level, H its height above the floor. A long wave that runs out has u - u_bar = (g/c)(eta - eta_0)
+!! level, H its height above the floor (the bed). A long wave that runs out has u - u_bar = (g/c)(eta - eta_0)
 !! and meets no resistance (the linear condition of a characteristic that brings nothing in); one of
 !! phase speed c' is reflected by (c - c')/(c + c'). u enters implicitly.
 !!
@@ -62,7 +62,7 @@ contains
           allocate (side%c(n(1), n(2)), side%velocity(n(1), n(2)), side%mean(n(1), n(2)), &
                     side%pressure(n(1), n(2)), side%impulse(n(1), n(2)), source=0.0_wp)
           if (.not. side%active .or. .not. any(abs(fluid%gravity) > 0.0_wp)) cycle
-          ! Where up is, how deep the water, and with it the speed of long waves.
+          ! Where up is, and how deep the water.
           axis = maxloc(abs(fluid%gravity), 1)
           side%up = findloc(side%along, axis, 1)
           side%upward = fluid%gravity(axis) < 0.0_wp
@@ -71,29 +71,42 @@ contains
           if (.not. side%levelled) cycle
           side%depth = fluid%water_level - grid%origin(axis)
           if (.not. side%upward) side%depth = grid%length(axis) - side%depth
-          if (side%depth <= 0.0_wp) cycle
-          side%celerity = sqrt(abs(fluid%gravity(axis))*side%depth)
-          side%memory = 4.0_wp*grid%length(d)/side%celerity
         end associate
       end do
     end do
   end subroutine outflow_init
 
-  !> The mean velocity of the start is that of the faces.
-  subroutine start_outflow(grid, c, uf, sides)
+  !> The mean velocity of the start is that of the faces. Waves run as over what stands in the last
+  !! cells, a bed: H is the mean over the side.
+  subroutine start_outflow(grid, fluid, alpha, c, uf, sides)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! C^ [-]
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) &
+      :: alpha, c   !! solid share, C^ [-]
     real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! lower faces [m/s]
     type(outflow_t), intent(inout) :: sides(2, 3)
-    integer :: s, d
+    real(wp), allocatable :: held(:)   ! share of each layer of cells in the depth
+    integer :: s, d, l, axis
 
     do d = 1, 3
       do s = 1, 2
-        if (.not. sides(s, d)%active) cycle
-        call gather(grid, s, d, c, uf, sides(s, d))
-        sides(s, d)%mean = sides(s, d)%velocity
+        associate (side => sides(s, d))
+          if (.not. side%active) cycle
+          if (side%depth > 0.0_wp) then
+            call gather(grid, s, d, alpha, uf, side)
+            held = sum(side%c, 3 - side%up)/size(side%c, 3 - side%up)
+            if (.not. side%upward) held = held(size(held):1:-1)
+            axis = side%along(side%up)
+            held = [(held(l)*min(1.0_wp, max(0.0_wp, side%depth/grid%h(axis) - l + 1)), &
+                     l=1, size(held))]
+            side%celerity = sqrt(abs(fluid%gravity(axis)) &
+                                 *max(0.0_wp, side%depth - grid%h(axis)*sum(held)))
+            if (side%celerity > 0.0_wp) side%memory = 4.0_wp*grid%length(d)/side%celerity
+          end if
+          call gather(grid, s, d, c, uf, side)
+          side%mean = side%velocity
+        end associate
       end do
     end do
   end subroutine start_outflow

@@ -142,9 +142,14 @@ contains
       integer, intent(in) :: n, b, f(4)
       real(wp), intent(in) :: share
       real(wp), intent(in) :: x(3)   !! centroid of the share [m]
+      integer :: last(3)
 
       self%face(:, n) = f
-      self%mine(n) = owned(grid, f(1:3), f(4))
+      last = grid%hi   ! a face is of the process of the cell above it; the uppermost of that below
+      associate (d => f(4))
+        if (grid%hi(d) == grid%n(d) .and. .not. grid%periodic(d)) last(d) = last(d) + 1
+      end associate
+      self%mine(n) = all(f(1:3) >= grid%lo .and. f(1:3) <= last)
       ! Flux of the unit motions of a body through its share of a face, upwards; none through a
       ! closed side of the domain.
       self%s(:, n) = 0.0_wp
@@ -205,19 +210,6 @@ contains
     side = grid%side_of_face(i, d)
     closed = side /= no_side .and. .not. gives_pressure(side)
   end function closed_side
-
-  !> Each face belongs to one process: that of the cell above it, or at the upper end of the domain
-  !! that of the cell below it.
-  pure function owned(grid, f, d) result(mine)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: f(3), d
-    logical :: mine
-    integer :: last(3)
-
-    last = grid%hi
-    if (grid%hi(d) == grid%n(d) .and. .not. grid%periodic(d)) last(d) = last(d) + 1
-    mine = all(f >= grid%lo) .and. all(f <= last)
-  end function owned
 
   !> Volume rate of all bodies through the lower faces [m3/s], with that of the fluid they hold.
   subroutine solid_face_flux(grid, bodies, self, flux, held)

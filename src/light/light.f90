@@ -21,14 +21,14 @@ module light_m
   use tet_mesh_m, only: shape_t
   use polyhedron_m, only: tet_moments_below
   use sling_m, only: hangs
-  use rigid_body_m, only: blocks_t, own_mass, drift, angular_velocity
+  use rigid_body_m, only: blocks_t, own_mass, drift, angular_velocity, follow_motions
   use bed_m, only: bed_t
   use bed_measure_m, only: bed_volume
   use panels_m, only: panels_t, surface_panels, split_panels
   use panel_method_m, only: added_inertia_t, added_inertia
   implicit none
   private
-  public :: light_t, light_init, resume_light, step_in_water, enter_water, store_water_force
+  public :: light_t, light_init, load_block, step_in_water, enter_water, store_water_force
   public :: added_inertia_of
 
   real(wp), parameter :: entry_loss = 1.2_wp      !! e [-]
@@ -111,17 +111,6 @@ contains
     light%wet = 0.0_wp   ! counted with the first step, as for a block that is released
   end subroutine light_init
 
-  !> What follows from the state after it was read.
-  subroutine resume_light(blocks, light)
-    type(blocks_t), intent(inout) :: blocks
-    type(light_t), intent(in) :: light
-    integer :: b
-
-    do b = 1, blocks%n
-      if (blocks%present(b) .and. .not. blocks%fixed(b)) call load_block(b, light, blocks)
-    end do
-  end subroutine resume_light
-
   !> Coefficients of the added mass of a shape; of a sphere they are known (Lamb, art. 92).
   function added_inertia_of(shape) result(added)
     type(shape_t), intent(in) :: shape
@@ -168,7 +157,7 @@ contains
     type(light_t), intent(inout) :: light
     real(wp), dimension(3, blocks%n) :: x, lost   ! poses at the start of the step
     real(wp) :: q(4, blocks%n)
-    real(wp) :: wet(blocks%n)                     ! V_w in the step before [m3]
+    real(wp) :: wet(blocks%n), time               ! V_w in the step before [m3]; its end [s]
     logical :: rests
     integer :: b
     real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
@@ -177,6 +166,7 @@ contains
     x = blocks%x
     lost = blocks%lost
     q = blocks%q
+    time = blocks%time
     call drift(0.5_wp*dt, blocks)
     call find_level(blocks, light)
     do b = 1, blocks%n
@@ -209,6 +199,7 @@ contains
     blocks%x = x
     blocks%lost = lost
     blocks%q = q
+    call follow_motions(time, blocks)
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle
       blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
@@ -260,6 +251,7 @@ contains
       integer :: b
 
       do b = 1, blocks%n
+        if (.not. blocks%present(b)) light%wet(b) = 0.0_wp
         if (.not. blocks%present(b)) cycle
         if (blocks%asleep(b) .and. abs(light%level - light%cut_at(b)) <= 0.0_wp) cycle
         call submerge(blocks, b, light%level, light%wet(b), light%moment(:, b))

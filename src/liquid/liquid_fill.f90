@@ -240,7 +240,7 @@ contains
     type(vertical_t), intent(in) :: vertical
     real(wp), intent(in) :: volume   !! [m3], > 0
     type(flow_t), intent(inout) :: flow
-    real(wp), intent(out) :: rest    !! volume that found no place [m3]
+    real(wp), intent(out) :: rest    !! volume that found no place, or < 0: came without [m3]
     integer, parameter :: max_iterations = 100
     type(cut_cell_t) :: cut
     real(wp), allocatable :: surface(:, :), gain(:)
@@ -282,8 +282,8 @@ contains
         flow%liquid(at(1), at(2), at(3)) = flow%liquid(at(1), at(2), at(3)) + gain(l)
       end associate
     end do
-    rest = max(-f, 0.0_wp)
-    if (rest <= 100.0_wp*epsilon(f)*volume) rest = 0.0_wp
+    rest = -f
+    if (abs(rest) <= 100.0_wp*epsilon(f)*volume) rest = 0.0_wp
   contains
     !> Volume of a layer of this height; `gain` holds the share of each cell.
     real(wp) function layer_volume(height) result(total)

@@ -32,8 +32,8 @@ module diagnostics_m
     integer :: transport_parts = 0            !! in which the volumes of the step moved
     type(contact_report_t) :: contact
     type(pressure_report_t) :: pressure       !! its divergence is that which the next step uses
-    real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m],
-    logical :: overlap_known = .false.        !! measured for rows only
+    real(wp) :: max_overlap = -1.0_wp         !! of the true shapes with one another or a wall [m],
+    logical :: overlap_known = .false.        !! measured for rows and frames only
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
     integer :: inertia_clips = 0              !! limits of added inertia that cut it
     integer :: warnings = 0                   !! printed in this step

@@ -79,6 +79,7 @@ contains
     character(*), parameter :: block_columns = '   released  moving  asleep overlap [mm]'
     character(160) :: line
     character(11) :: left
+    character(13) :: overlap
     real(wp) :: seconds
     integer :: released, s
 
@@ -103,9 +104,10 @@ contains
       write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, of('dt'), &
         nint(of('substeps')), of('contact_courant_max')
     end if
-    write (line(len_trim(line) + 1:), '(a11, i8, i8, f13.4)') to_text(released)//'/' &
-      //to_text(blocks%n), count(blocks%speed > clock%run%rest_speed), count(blocks%asleep), &
-      1.0e3_wp*of('max_overlap')
+    overlap = '            -'   ! of a line between rows
+    if (of('max_overlap') >= 0.0_wp) write (overlap, '(f13.4)') 1.0e3_wp*of('max_overlap')
+    write (line(len_trim(line) + 1:), '(a11, i8, i8, a)') to_text(released)//'/' &
+      //to_text(blocks%n), count(blocks%speed > clock%run%rest_speed), count(blocks%asleep), overlap
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') of('liquid_volume_drift')
     ! wall time to the end at the mean speed so far, as h:mm:ss
     seconds = 3.6e6_wp

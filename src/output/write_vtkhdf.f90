@@ -9,7 +9,7 @@
 module write_vtkhdf_m
   use kinds_m, only: wp, sp
   use vectors_m, only: cross, rotation_matrix
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, lowering
   use state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t, as_integer, as_wide
   use file_space_m, only: bytes_for_change
@@ -157,8 +157,8 @@ contains
       call file%group(root//'/CellData')
       call file%store(cell_data//'body', '1', on_cells(blocks, [(b, b=1, blocks%n)]), &
         kind=as_integer)
-      call file%store(cell_data//'fixed', '1', on_cells(blocks, merge(1, 0, blocks%fixed)), &
-        kind=as_integer)
+      call file%store(cell_data//'fixed', '1', on_cells(blocks, merge(1, 0, blocks%fixed &
+        .and. blocks%status /= lowering)), kind=as_integer)
       call file%group(root//'/PointData')
       call file%group(steps//'/PointDataOffsets')
     end associate

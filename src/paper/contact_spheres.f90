@@ -318,7 +318,7 @@ contains
         point%length = 2*radius
         if (b == bed_counterpart) then
           call bed_distance(walls%bed, bed_place(walls%bed, blocks%x(:, a) + c), radius + gap, &
-            2*radius + gap, self%found, distance, outward)
+            radius + gap + self%bounding_radius(a), self%found, distance, outward)
           if (all(abs(outward) <= 0.0_wp)) cycle
           point%normal = -outward
           point%depth = radius - distance

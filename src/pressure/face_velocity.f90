@@ -277,10 +277,9 @@ contains
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
     integer :: i, j, k, e(3)
-    real(wp) :: nu, inverse_h2
+    real(wp) :: nu
 
     e = unit_step(:, d)
-    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
@@ -290,7 +289,7 @@ contains
             nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k)) &
                  /face_mean(rho(p, q, r), rho(i, j, k))
             flow%uf(i, j, k, d) = face_mean(flow%u(p, q, r, d), flow%u(i, j, k, d)) &
-              + face_step(dt, nu, inverse_h2)*(a%face(i, j, k, d) &
+              + face_step(dt, nu, grid%inverse_h2)*(a%face(i, j, k, d) &
                   - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
           end associate
         end do
@@ -336,10 +335,9 @@ contains
       correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flow_t), intent(inout) :: flow
     integer :: i, j, k, e(3)
-    real(wp) :: nu, inverse_h2, most
+    real(wp) :: nu, most
 
     e = unit_step(:, d)
-    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu, most) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
@@ -354,7 +352,7 @@ contains
           nu = face_mean(flow%mu(i - e(1), j - e(2), k - e(3)), flow%mu(i, j, k)) &
                /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
-            + face_step(dt, nu, inverse_h2)/dt*correction(i, j, k, d)
+            + face_step(dt, nu, grid%inverse_h2)/dt*correction(i, j, k, d)
         end do
       end do
     end do

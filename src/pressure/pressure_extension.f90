@@ -34,9 +34,11 @@ contains
     real(wp), parameter :: film = 0.01_wp       ! aperture of all faces below which it is one
     integer, allocatable :: known(:, :, :)   ! since which pass; -1: not yet, 0: it lends none
     integer, allocatable :: cell(:, :)       ! (3, *) of those that take no part
+    real(wp) :: weight(3)   ! along a period it is a plain force [m/s2]
     integer :: k, l, n, pass, round
     integer(i8) :: left(1)
 
+    weight = merge(0.0_wp, gravity, grid%periodic)
     associate (a => grid%first, b => grid%last)
       allocate (known(a(1):b(1), a(2):b(2), a(3):b(3)))
     end associate
@@ -96,13 +98,13 @@ contains
       count = 0
       total = 0.0_wp
       do d = 1, 3
-        if (round == 1 .and. abs(gravity(d)) > 0.0_wp) cycle
+        if (round == 1 .and. abs(weight(d)) > 0.0_wp) cycle
         do s = -1, 1, 2
           o = c + s*unit_step(:, d)
           if (any((o < 1 .or. o > grid%n) .and. .not. grid%periodic)) cycle
           if (any(known(o(1), o(2), o(3)) == [-1, 0, pass])) cycle
           count = count + 1
-          total = total + flow%p(o(1), o(2), o(3)) - real(s, wp)*gravity(d)*grid%h(d) &
+          total = total + flow%p(o(1), o(2), o(3)) - real(s, wp)*weight(d)*grid%h(d) &
                   *face_mean(flow%rho(o(1), o(2), o(3)), flow%rho(c(1), c(2), c(3)))
         end do
       end do

@@ -163,14 +163,15 @@ contains
     type(grid_t), intent(in) :: grid
     type(rigid_motion_t), intent(in) :: bodies
     type(pressure_system_t), intent(inout) :: self
-    real(wp), parameter :: rounding = 1.0e-9_wp   !! [area of a face]
+    real(wp), parameter :: rounding = 1.0e-9_wp   !! [face, cell]
 
     associate (op => self%operator, work => self%solver%work)
       op%bodies = bodies
       op%pressed = .false.
       if (.not. (work%singular .and. any(op%bodies%free))) return
       call force_from_cells(op%bodies, op%flux, work%is_open, op%lo - 1, op%wall_share)
-      op%pressed = any(abs(op%wall_share(1:3, :)) > rounding*minval(grid%area))
+      op%pressed = any(abs(op%wall_share(1:3, :)) > rounding*minval(grid%area)) .or. &
+        any(abs(op%wall_share(4:6, :)) > rounding*grid%volume)
       if (.not. op%pressed) return
       op%wall_share = op%wall_share/work%n_open
       op%is_open = work%is_open

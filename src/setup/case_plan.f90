@@ -4,8 +4,7 @@ module case_plan_m
   use kinds_m, only: wp, i8
   use vectors_m, only: cube_root, norm
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, is_given, &
-    smallest_spacing, has_flow, not_resolved
+  use case_types_m, only: case_t, is_given, smallest_spacing, has_flow, not_resolved
   use rigid_body_m, only: blocks_t
   use case_blocks_m, only: blocks_init
   use boundary_kinds_m, only: side_code, gives_pressure
@@ -244,20 +243,17 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(bed_t), intent(in) :: bed
     real(wp) :: fastest(2)   ! speed and spin [m/s], [rad/s]
+    character(:), allocatable :: last
     integer :: n_fixed, n_moved, i
 
     n_fixed = count(case%body%fixed)
     call heading('Bodies')
     call entry('fixed', to_text(n_fixed))
     call entry('free', to_text(size(case%body) - n_fixed))
-    associate (n => size(case%body))
-      if (blocks%n == n) then
-        call entry('dropped', '0')
-      else
-        call entry('dropped', to_text(blocks%n - n)//', the last one at ' &
-                   //brief(maxval(blocks%release_time(n + 1:)))//' s')
-      end if
-    end associate
+    last = ''
+    if (blocks%n > size(case%body)) last = ', the last one at ' &
+      //brief(maxval(blocks%release_time(size(case%body) + 1:)))//' s'
+    call entry('dropped', to_text(blocks%n - size(case%body))//last)
     if (case%begun%n > 0) call entry('begin elsewhere', to_text(case%begun%n)//', where ' &
       //file_text(case%start%file)//' left them at '//brief(case%begun%time)//' s')
     n_moved = 0
@@ -273,8 +269,7 @@ contains
   end subroutine print_bodies
 
   !> The level when all that comes later is under water: it rises by the volume of that over the
-  !! area of the tank, but not where water can leave through a side, nor where a bed reaches out of
-  !! it.
+  !! area of the tank, but not where water can leave through a side or a bed reaches out of it.
   subroutine print_rise(case, blocks, bed)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks
@@ -295,8 +290,7 @@ contains
     end if
     rise = 0.0_wp
     do b = 1, blocks%n
-      if (b > size(case%body) .or. blocks%release_time(b) > 0.0_wp) rise = rise &
-        + blocks%shapes(blocks%shape(b))%volume
+      if (.not. blocks%present(b)) rise = rise + blocks%shapes(blocks%shape(b))%volume
     end do
     if (rise <= 0.0_wp) return
     rise = rise/(case%grid%length(1)*case%grid%length(2))

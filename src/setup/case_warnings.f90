@@ -135,19 +135,16 @@ contains
   subroutine look_at_sides(case, warnings)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: warnings
-    real(wp) :: along(3)
     integer :: s, d
 
     do d = 1, 3
-      along = case%fluid%gravity
-      along(d) = 0.0_wp
       do s = 1, 2
         if (case%boundary%kind(s, d) == 'inflow' .and. .not. (case%fluid%single_phase &
             .or. is_given(case%fluid%water_level))) then
           call warnings%add_message('&boundary '//side_name(s, d) &
             //' = ''inflow'': only gas comes in without &fluid water_level')
         else if (case%boundary%kind(s, d) == 'open' .and. case%fluid%single_phase &
-            .and. any(abs(along) > 0.0_wp)) then
+            .and. any(abs(case%fluid%gravity) > 0.0_wp .and. [1, 2, 3] /= d)) then
           call warnings%add_message('&boundary '//side_name(s, d)//' = ''open'': gravity acts ' &
             //'along it and the pressure on it is 0 from top to bottom, so with single_phase the ' &
             //'liquid flows from rest; it stays at rest beside an ''outflow''')
@@ -205,13 +202,19 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(problems_t), intent(inout) :: warnings
-    integer :: i, n
+    character(:), allocatable :: group
+    integer :: i, k, n
 
-    do i = 1, size(case%drop)
-      if (case%drop(i)%count > 0) call look_at(place_of_block(case%drop(i), 1), '&drop', &
-                                               case%drop(i)%line)
-    end do
     n = 0
+    do i = 1, size(case%drop)
+      do k = 1, case%drop(i)%count
+        if (k > 1 .and. .not. allocated(case%drop(i)%row)) exit   ! all fall from one place
+        group = '&drop'
+        if (allocated(case%drop(i)%row)) group = '&drop file = '//quoted_text(case%drop(i)%file) &
+          //', block '//to_text(k)//':'
+        if (n < max_bodies) call look_at(place_of_block(case%drop(i), k), group, case%drop(i)%line)
+      end do
+    end do
     do i = 1, size(case%body)
       if (n < max_bodies) call look_at(place_of_body(case%body(i)), '&body', &
                                              case%body(i)%line)
@@ -273,15 +276,16 @@ contains
     if (input%density < min_density) call warnings%add('&shape density', input%density, &
       'of '//name//' is in kg/m3; concrete has about 2300', input%line)
     min_turning = turning_share*case%fluid%liquid_density
-    if (case%run%physics == 'coupled' .and. input%density < min_turning) then
-      call warnings%add('&shape density', input%density, 'of '//name//': it turns with the ' &
-        //'inertia of '//brief(min_turning, 3)//' kg/m3, for the liquid that it drags along', &
-        input%line)
-    end if
+    if (case%run%physics == 'coupled' .and. input%density < min_turning) call warnings%add( &
+      '&shape density', input%density, 'of '//name//': it turns with the inertia of ' &
+      //brief(min_turning, 3)//' kg/m3, for the liquid that it drags along', input%line)
     if (extent > largest_block) then
       if (input%kind == 'file') then
         call warnings%add('&shape scale', input%scale, name//' is '//brief(extent, 3) &
           //' m long; scale = 0.001 makes m of mm', input%line)
+      else if (input%kind == 'rock') then
+        call warnings%add('&shape mass_50', input%mass_50, name//' is '//brief(extent, 3) &
+          //' m long; masses are in kg', input%line)
       else
         call warnings%add('&shape size', input%size(1), name//' is '//brief(extent, 3) &
           //' m long; lengths are in m, not in mm', input%line)

@@ -11,7 +11,7 @@
 !! projection. `micstools.cases.initial_state` writes such a file.
 module initial_state_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use errors_m, only: problems_t, fatal, to_text, exit_files
   use case_types_m, only: case_t, fluid_t, is_given, has_flow
   use named_files_m, only: found_file
@@ -136,7 +136,7 @@ contains
     if (.not. is_named(fluid)) return
     call file%open(found_file(fluid%initial_state), .false., .false.)
     extent = grid%hi - grid%lo + 1
-    allocate (part(3*product(extent)), source=0.0_wp)
+    allocate (part(3_i8*product(extent)), source=0.0_wp)
     associate (a => grid%lo, b => grid%hi, n => product(extent))
       if (file%has(liquid_name)) then
         call file%read(liquid_name, part(:n), a, extent)

@@ -12,7 +12,7 @@ module scene_m
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, are_driven
-  use case_blocks_m, only: blocks_init
+  use case_blocks_m, only: blocks_init, attitude_on
   use drops_m, only: place_of_block, shape_of_place
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
@@ -58,7 +58,7 @@ contains
     end do
     good%body = pack(case%body, use_it)
     scene%n_bodies = size(good%body)
-    call add_fixed_rows(case, made, good%body, scene)
+    call add_fixed_rows(case, made, bed, good%body, scene)
     scene%n = size(good%body)
     scene%line = good%body%line
     scene%dated = .not. good%body%time_faulty
@@ -79,9 +79,10 @@ contains
   end subroutine set_scene
 
   !> The fixed blocks of tables, whose height is known, stand there like bodies of the case.
-  subroutine add_fixed_rows(case, shapes, body, scene)
+  subroutine add_fixed_rows(case, shapes, bed, body, scene)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
     type(body_input_t), allocatable, intent(inout) :: body(:)
     type(scene_t), intent(inout) :: scene
     type(body_input_t), allocatable :: all_bodies(:)
@@ -106,8 +107,8 @@ contains
         if (s == 0 .or. .not. is_given(place%x(3))) cycle
         n = n + 1
         all_bodies(n) = body_input_t(line=case%drop(i)%line, shape=shapes(s)%name, &
-          position=place%x, quaternion=place%q, velocity=place%v, fixed=.true., &
-          release_time=place%time)
+          position=place%x, quaternion=attitude_on(bed, case%drop(i)%handling, place, shapes(s)), &
+          velocity=place%v, fixed=.true., release_time=place%time)
         scene%origin(:, n) = [i, k]
       end do
     end do

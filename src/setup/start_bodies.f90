@@ -12,7 +12,7 @@ module start_bodies_m
   use named_files_m, only: found_file
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, let_go, out
   use case_blocks_m, only: blocks_init
   use hdf5_file_m, only: h5_file_t
   implicit none
@@ -60,8 +60,8 @@ contains
     real(wp), allocatable, intent(inout) :: mass(:)            !! [kg]
     type(problems_t), intent(inout) :: problems
     type(h5_file_t) :: file
-    real(wp), allocatable :: time(:), release_time(:)
-    integer, allocatable :: extent(:), fixed(:)
+    real(wp), allocatable :: time(:), release_time(:), exit_time(:)
+    integer, allocatable :: extent(:), fixed(:), status(:)
     integer :: row
 
     call file%open(found_file(case%start%file), .false., .false.)
@@ -80,7 +80,7 @@ contains
     call file%shape_of('/bodies/mass', extent)
     if (file%info == 0) left%n = product(extent)
     associate (n => left%n)
-      allocate (left%shape(n), release_time(n))
+      allocate (left%shape(n), release_time(n), exit_time(n), status(n))
       left%name = spread(repeat(' ', name_length), 1, n)
       mass = spread(0.0_wp, 1, n)
       allocate (left%x(3, n), left%q(4, n), left%v(3, n), left%omega(3, n), fixed(n))
@@ -89,12 +89,15 @@ contains
       call file%read('/bodies/mass', mass)
       call file%read('/bodies/fixed', fixed)
       call file%read('/bodies/release_time', release_time)
+      call file%read('/bodies/exit_time', exit_time)
+      call file%read('/bodies/status', status)
       if (file%info == 0) then
         row = row_of(case, time, problems)
         if (row > 0) then
           left%time = time(row)
           free = fixed == 0
-          taken = free .and. has_come(release_time, left%time)
+          taken = free .and. has_come(release_time, left%time) .and. (status == let_go &
+            .or. (status == out .and. .not. has_come(exit_time, left%time)))
           call read_row('position', 3, left%x)
           call read_row('quaternion', 4, left%q)
           call read_row('velocity', 3, left%v)
@@ -202,8 +205,7 @@ contains
     call bring_along(case, left, taken .and. here == 0)
     call keep(case%begun)
   contains
-    !> Note a fault of a shape. Of a kind the first is reported, with the number of the others: the
-    !! stones of a family have one cause.
+    !> Note a fault of a shape. Of a kind the first is told, and the number of the others.
     subroutine differs(kind, what)
       integer, intent(in) :: kind
       character(*), intent(in) :: what

@@ -3,7 +3,7 @@
 !! The signed distance of a point follows exactly from the flat convex facets and the edges between
 !! them (`surface_features_m` makes them). Body axes, origin at the centre of mass.
 module surface_search_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use neighbours_m, only: bins_t
@@ -44,8 +44,8 @@ module surface_search_m
   type :: near_list_t
     integer :: n = 0
     integer, allocatable :: item(:)
-    integer, allocatable, private :: mark(:)     !! search in which each item was seen last
-    integer, private :: search = 0
+    integer(i8), allocatable, private :: mark(:)     !! search in which each item was seen last
+    integer(i8), private :: search = 0
   end type near_list_t
 
   !> Facets and edges found by a search.
@@ -101,10 +101,10 @@ contains
     list%n = 0
     call ensure_capacity(1, list%item)
     if (any(low > bins%high) .or. any(high < bins%low)) return
-    if (.not. allocated(list%mark)) allocate (list%mark(n_items), source=0)
+    if (.not. allocated(list%mark)) allocate (list%mark(n_items), source=0_i8)
     if (size(list%mark) < n_items) then
       deallocate (list%mark)
-      allocate (list%mark(n_items), source=0)
+      allocate (list%mark(n_items), source=0_i8)
     end if
     a = bins%place(low)
     b = bins%place(high)

@@ -20,7 +20,7 @@ module merged_cells_m
   public :: max_targets, is_unmerged, velocity_at_wall, match_densities
 
   integer, parameter :: halo_layers = 2      !! layers of the halo with small cells that are needed
-  integer, parameter :: max_targets = 3  !! of a small cell
+  integer, parameter :: max_targets = 4  !! of a small cell
   integer, parameter :: here(3) = 0      !! no step
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a target.
@@ -344,10 +344,11 @@ contains
     integer :: d, f(3), i, j, k, n
     real(wp) :: along, cosine, way(3)
 
+    steps = 0
+    share = 0.0_wp
     do d = 1, 3
       steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
       f = c + max(steps(:, d), 0)
-      share(d) = 0.0_wp
       if (.not. centre_in_fluid(grid, solid, c + steps(:, d))) cycle
       share(d) = solid%aperture(f(1), f(2), f(3), d)*(grid%area(d)/grid%area(1))*abs(normal(d))
     end do

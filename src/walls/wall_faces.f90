@@ -31,10 +31,8 @@ contains
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
-    real(wp) :: inverse_h2
     integer :: m, d, c(3)
 
-    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(d, c) schedule(dynamic, 64)
     do m = 1, merged%n
       do d = 1, 3
@@ -64,8 +62,8 @@ contains
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
-          - (face_step(dt, nu, inverse_h2) - face_step(time, nu, inverse_h2))*(a%face(i, j, k, d) &
-              - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
+          - (face_step(dt, nu, grid%inverse_h2) - face_step(time, nu, grid%inverse_h2)) &
+          *(a%face(i, j, k, d) - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
       end associate
     end subroutine shorten
   end subroutine shorten_at_walls
@@ -154,7 +152,7 @@ contains
         time = dt
         if (.not. c_ismac) time = rhie_chow_time(dt, dt*sum(abs(u - wall)/grid%h))
         time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), &
-                         sum(1.0_wp/grid%h**2))
+                         grid%inverse_h2)
         gain = time*(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
       else
         wall = wall_velocity(at_start%motion(:, body), arm)

@@ -3,6 +3,7 @@ module test_impulses_m
   use kinds_m, only: wp
   use check_m, only: check, checked
   use errors_m, only: to_text
+  use parallel_m, only: get_threads, set_threads
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: kinetic_energy
   use world_m, only: world_t, set_up, body, move
@@ -23,6 +24,7 @@ contains
     call check_peak()
     call check_random_pairs()
     call check_heavy_on_light()
+    call check_raft()
   end subroutine test_impulses
 
   subroutine start(contact, groups, world)
@@ -149,5 +151,29 @@ contains
     call check('a plate under a heavy cube', deepest < 0.01_wp*0.43_wp)
     call check('both at rest', maxval(abs(world%blocks%v)), 0.0_wp, 1.0e-4_wp)
   end subroutine check_heavy_on_light
+
+  !> A raft under 100 cubes, more than pairs of one body have colours: any number of threads gives
+  !! the same bits.
+  subroutine check_raft()
+    type(world_t) :: world(2)
+    character(:), allocatable :: bodies
+    integer :: i, threads
+
+    bodies = '&shape name="raft" kind="box" size=.3,.3,.02/ ' &
+      //body('raft', [0.5_wp, 0.5_wp, 0.01_wp])
+    do i = 0, 99
+      bodies = bodies//body('cube', [0.37_wp, 0.37_wp, 0.0301_wp] &
+        + [0.028_wp*modulo(i, 10), 0.028_wp*(i/10), 0.0_wp])
+    end do
+    threads = get_threads()
+    do i = 1, 2
+      call set_threads(2*i - 1)
+      call start('', '&grid cells=3*2 length=3*1/ '//cube//bodies, world(i))
+      call move(world(i), 20, dt)
+    end do
+    call set_threads(threads)
+    call check('on one thread or three', all(abs(world(1)%blocks%x - world(2)%blocks%x) <= 0.0_wp))
+    call check('they lie on it', world(1)%blocks%x(3, 2:), 0.03_wp, 1.0e-5_wp)
+  end subroutine check_raft
 
 end module test_impulses_m

@@ -2,7 +2,7 @@
 module test_release_m
   use check_m, only: check, wp
   use rigid_body_m, only: blocks_t
-  use release_m, only: release_due_blocks, next_release, n_pending
+  use release_m, only: release_due_blocks, next_release, are_waiting
   use world_m, only: world_t, set_up
   implicit none
   private
@@ -11,7 +11,7 @@ module test_release_m
   character(*), parameter :: head = '&run t_end=1 physics="dry"/ &grid cells=3*10 length=3*1/ ' &
     //'&shape name="cube" kind="cube" size=.1/ '
   type(world_t), target :: world
-  logical :: pending(4), released
+  logical :: released
   integer :: warnings
 
 contains
@@ -31,15 +31,15 @@ contains
   subroutine one_after_another(blocks)
     type(blocks_t), intent(inout) :: blocks
 
-    pending = .false.
     warnings = 0
     call check('one at the start', all(blocks%present .eqv. [.true., .false., .false., .false.]))
     call check('next release', next_release(0.0_wp, blocks), 0.25_wp)
 
     call try(0.0_wp)
     call check('no room: not released', .not. (released .or. blocks%present(3)))
-    call check('no room: it waits', pending(3) .and. n_pending(0.1_wp, blocks) == 1)
-    call check('due at the very end: not waiting', n_pending(0.0_wp, blocks), 0)
+    call check('no room: it waits', count(are_waiting(0.1_wp, blocks)) == 1 .and. .not. &
+      blocks%present(3))
+    call check('due at the very end: not waiting', count(are_waiting(0.0_wp, blocks)), 0)
     call check('warned', warnings, 1)
     call try(0.1_wp)
     call check('warned once', warnings, 1)
@@ -61,10 +61,10 @@ contains
     call check('room at last', released .and. blocks%present(3))
     call check('the true time is kept', blocks%release_time(3), 0.5_wp)
     call check('said once more', warnings, 2)
-    call check('nobody waits', n_pending(0.5_wp, blocks), 0)
+    call check('nobody waits', count(are_waiting(0.5_wp, blocks)), 0)
 
     call try(0.75_wp)
-    call check('the next of the drop finds the one before', n_pending(0.8_wp, blocks), 1)
+    call check('the next of the drop finds the one before', count(are_waiting(0.8_wp, blocks)), 1)
     blocks%x(3, 3) = 0.3_wp
     call try(0.8_wp)
     call check('all there', all(blocks%present))
@@ -77,18 +77,17 @@ contains
   !! last two touch, or overlap by less than a release allows; two more exclude one another.
   subroutine check_together()
     type(world_t), target :: row
-    logical :: gone(6), waits(6)
+    logical :: gone(6)
 
     call set_up(head//'&shape name="long" kind="box" size=.6,.1,.1/ &drop shape="long" ' &
       //'position=.5,.45,.5 count=1 first_time=1/ '//cube('.3,.5,.5')//cube('.5,.5,.5') &
       //cube('.5991,.5,.5')//cube('.5,.8,.5')//cube('.59,.8,.5'), row)
-    waits = .false.
-    call release_due_blocks(row%walls, 1.0_wp, row%overlap, row%blocks, waits, warnings, released)
+    call release_due_blocks(row%walls, 1.0_wp, row%overlap, row%blocks, warnings, released)
     gone = [.false., .true., .true., .true., .true., .false.]
     call check('those that fit go together', all(row%blocks%present .eqv. gone))
-    call check('the others wait', all(waits .eqv. .not. gone))
+    call check('the others wait', all(are_waiting(1.05_wp, row%blocks) .eqv. .not. gone))
     row%blocks%x(3, 2:4) = 0.2_wp
-    call release_due_blocks(row%walls, 1.1_wp, row%overlap, row%blocks, waits, warnings, released)
+    call release_due_blocks(row%walls, 1.1_wp, row%overlap, row%blocks, warnings, released)
     call check('the long one after them', row%blocks%present(1) .and. .not. row%blocks%present(6))
   end subroutine check_together
 
@@ -103,8 +102,7 @@ contains
   subroutine try(time)
     real(wp), intent(in) :: time   !! [s]
 
-    call release_due_blocks(world%walls, time, world%overlap, world%blocks, pending, warnings, &
-                            released)
+    call release_due_blocks(world%walls, time, world%overlap, world%blocks, warnings, released)
   end subroutine try
 
 end module test_release_m

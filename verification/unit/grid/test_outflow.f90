@@ -44,7 +44,7 @@ contains
     flow%c(:, :, 3) = 0.5_wp
     if (single_phase) flow%c = 1.0_wp
     call outflow_init(grid, fluid, flow%sides)
-    call start_outflow(grid, flow%c, flow%uf, flow%sides)
+    call start_outflow(grid, fluid, 0*flow%c, flow%c, flow%uf, flow%sides)
   end subroutine make
 
   subroutine update()
@@ -72,6 +72,11 @@ contains
     end do
     call check('other sides', pressure_outside(flow%sides(1, 1), [0, 2, 1]), 0.0_wp)
     call check('speed of long waves', flow%sides(2, 1)%celerity, sqrt(g*0.25_wp), 1.0e-14_wp)
+    flow%p = 0.0_wp   ! a bed: one of three columns up to 0.1 m, and the others up to 0.05 m
+    flow%p(4, :, 1) = 0.5_wp
+    flow%p(4, 2, 1) = 1.0_wp
+    call start_outflow(grid, fluid, flow%p, flow%c, flow%uf, flow%sides)
+    call check('over a bed', flow%sides(2, 1)%celerity, sqrt(g*(0.25_wp - 0.2_wp/3)), 1.0e-14_wp)
   end subroutine columns
 
   !> One column stands 0.05 m higher: its liquid cells lack the weight of 0.05 m; a wave meets the
@@ -101,7 +106,7 @@ contains
 
     call make([0.0_wp, 0.0_wp, -g], .false.)
     flow%uf(5, :, :, 1) = 0.3_wp
-    call start_outflow(grid, flow%c, flow%uf, flow%sides)
+    call start_outflow(grid, fluid, 0*flow%c, flow%c, flow%uf, flow%sides)
     flow%uf(5, :, :, 1) = 0.7_wp
     call update()
     t = 4.0_wp*4.0_wp/sqrt(g*0.25_wp)
@@ -117,6 +122,7 @@ contains
     flow%c(:, 3, :) = 1.0_wp
     fluid%water_level = 4.0_wp
     call outflow_init(grid, fluid, flow%sides)
+    call start_outflow(grid, fluid, 0*flow%c, flow%c, flow%uf, flow%sides)
     call update()
     call check('upside down: bottom', pressure_outside(flow%sides(2, 1), [5, 3, 4]), &
                g*(2.0_wp*rho_g + 2.0_wp*rho_g + rho_l), 1.0e-9_wp)

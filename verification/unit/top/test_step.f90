@@ -2,6 +2,7 @@
 module test_step_m
   use check_m, only: check, wp
   use errors_m, only: to_text
+  use rigid_body_m, only: let_go
   use liquid_fill_m, only: liquid_volume
   use boundary_m, only: fill_scalar_halo
   use one_body_m, only: random_numbers
@@ -23,6 +24,12 @@ contains
     call growth_of_steps()
     call spinning_ball()
     call release_into_water()
+    call comes_as_another_goes()
+    call comes_late_and_is_held()
+    call nobody_is_left()
+    call set_down_softly()
+    call slice_of_any_width(1.0_wp)
+    call slice_of_any_width(1.0e-3_wp)
     call noise_in_gas(0.0_wp, 1.0e-3_wp)
     call noise_in_gas(1.0_wp, 2.0e-3_wp)
   end subroutine test_step
@@ -186,6 +193,72 @@ contains
                0.04_wp*0.03_wp*0.035_wp, 0.05_wp*0.04_wp*0.03_wp*0.035_wp)
     call check('release: it falls', sim%blocks%v(3, 1) < 0.0_wp)
   end subroutine release_into_water
+
+  !> A box passes the outflow in the step in which another comes: what flows in fills its place.
+  subroutine comes_as_another_goes()
+    type(world_t) :: sim
+
+    call tank('&boundary x_max="outflow"/ &body shape="box" position=.1195,.0389,.03 ' &
+      //'velocity=.5,0,0/ &body shape="box" position=.04,.0389,.03 release_time=2e-3/', sim)
+    call run(sim, 2)
+    call check('one came, one is out', all(sim%blocks%present .eqv. [.false., .true.]))
+    call check('no gas in its place', minval(sim%flow%c(1:12, 1:8, 1:5)) > 0.999_wp)
+  end subroutine comes_as_another_goes
+
+  !> A held box that comes after the start carries what falls on it.
+  subroutine comes_late_and_is_held()
+    type(world_t) :: sim
+
+    call tank('&body shape="box" position=.06,.04,.03 fixed=T release_time=.01/ ' &
+      //'&body shape="box" position=.06,.04,.075/', sim, 'dt=2e-3 physics="dry"')
+    call run(sim, 150)
+    call check('it lies on it', sim%blocks%x(3, 2), 0.03_wp + 0.035_wp, 1.0e-4_wp)
+  end subroutine comes_late_and_is_held
+
+  !> Where no free block is left that could move, all is at rest.
+  subroutine nobody_is_left()
+    type(world_t) :: sim
+
+    call tank('&body shape="box" position=.06,.04,.03 fixed=T/ &drop shape="box" ' &
+      //'position=.06,.04,.03 if_blocked="skip"/', sim, 'dt=2e-3 physics="dry"')
+    call run(sim, 2)
+    call check('skipped: the others rest', sim%clock%rest_began >= 0.0_wp)
+  end subroutine nobody_is_left
+
+  !> However far it is lowered in a step, a block slows down above the floor.
+  subroutine set_down_softly()
+    type(world_t) :: sim
+    real(wp) :: up
+    integer :: i
+
+    call tank('&drop shape="box" position=.06,.04,.1 lowering_speed=.3 release="set_down"/', sim, &
+      'dt=.02 physics="dry"')
+    up = 0.0_wp
+    do i = 1, 60
+      call run(sim, 1)
+      up = max(up, sim%blocks%v(3, 1))
+    end do
+    call check('it was set down', sim%blocks%status(1), let_go)
+    call check('and does not hop', up < 0.1_wp)
+  end subroutine set_down_softly
+
+  !> How wide a slice is says nothing: the water around a held box is the same.
+  subroutine slice_of_any_width(viscosity)
+    real(wp), intent(in) :: viscosity   !! [Pa s]
+    character(4), parameter :: width(2) = ['.01 ', '.001']
+    type(world_t) :: sim(2)
+    integer :: n
+
+    do n = 1, 2
+      call tank('&grid cells=12,1,12 length=.12,'//width(n)//',.12/ &boundary y_min="slip" ' &
+        //'y_max="slip"/ &shape name="b" kind="box" size=.037,.02,.035/ &body shape="b" ' &
+        //'position=.0613,.0005,.0571 fixed=T/', sim(n), fluid='single_phase=T velocity=.5,0,0 ' &
+        //'liquid_viscosity='//to_text(viscosity))
+      call run(sim(n), 5)
+    end do
+    call check('slices of two widths', sim(1)%flow%u(1:12, 1, 1:12, :) &
+      - sim(2)%flow%u(1:12, 1, 1:12, :), 0.0_wp, 1.0e-6_wp)
+  end subroutine slice_of_any_width
 
   !> The old pressure of gas is a guess that the solve replaces. Noise in it hardly changes the
   !! velocity of a block that falls through the level, with gas in its cut cells: without viscosity

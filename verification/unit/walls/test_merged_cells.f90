@@ -50,8 +50,8 @@ contains
     call check('small have their centre in the box', all([(centre_in_box(m), m=1, merged%n_small)]))
     call check('the top layer belongs to those above', all(target_of(4, 5, top) == [4, 5, top + 1]))
     call check('at an edge to both beside it, most to the one along the normal', &
-      merged%share(:, merged%number(4, 6, top)), [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
-    call check('no profile at an edge', merged%r(:, merged%number(4, 6, top)), spread(1.0_wp, 1, 3))
+      merged%share(:3, merged%number(4, 6, top)), [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
+    call check('no profile at an edge', merged%r(:3, merged%number(4, 6, top)), spread(1.0_wp, 1, 3))
     call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a small one', merged%r(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
@@ -213,7 +213,7 @@ contains
       box%solid%aperture(4, 7, top, 2) = 0.5_wp
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
-      call check('shares close with the face', merged%share(:, small), &
+      call check('shares close with the face', merged%share(:3, small), &
                  [0.0_wp, 0.5_wp*0.2_wp, 0.8_wp]/0.9_wp, 1.0e-12_wp)
     end associate
   end subroutine closing_face
