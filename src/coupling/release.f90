@@ -228,9 +228,9 @@ contains
     end function same_moment
   end subroutine order_due
 
-  !> Take the free and the lowered blocks out whose centre of mass has passed an open side: they keep the place and
-  !! the speed of then, displace nothing and touch nothing any more. The fluxes of the step bring
-  !! fluid into the space that opens.
+  !> Take the free and lowered blocks out whose centre of mass has passed an open side: they keep
+  !! the place and the speed of then, displace nothing and touch nothing any more. The fluxes of the
+  !! step bring fluid into the space that opens.
   subroutine take_out(grid, gravity, time, blocks)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]

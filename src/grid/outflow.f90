@@ -5,7 +5,7 @@
 !! $$ p = \int \rho g\,dz + C \rho_l [\, c (u - \bar u) - g (\eta - \eta_0)\, ], \quad
 !!    c = \sqrt{g H} $$
 !! u is the outward velocity of the face, eta the level of the last column of cells, eta_0 the given
-!! level, H its height above the floor (the bed). A long wave that runs out has u - u_bar = (g/c)(eta - eta_0)
+!! level, H its depth there. A long wave that runs out has u - u_bar = (g/c)(eta - eta_0)
 !! and meets no resistance (the linear condition of a characteristic that brings nothing in); one of
 !! phase speed c' is reflected by (c - c')/(c + c'). u enters implicitly.
 !!

@@ -9,8 +9,9 @@ import secrets
 import shutil
 import stat
 from collections.abc import Iterable, Sequence
+from math import isfinite
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 
 def write(path: Path, text: str | bytes) -> None:
@@ -65,6 +66,15 @@ def write_table(path: Path, rows: Sequence[dict[str, object]]) -> Path:
     """Write rows with the same names as CSV."""
     write(path, table_text(rows, list(rows[0])))
     return path
+
+
+def known(value: Any) -> Any:
+    """The same without nan and infinite numbers, which JSON has not."""
+    if isinstance(value, dict):
+        return {k: known(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [known(v) for v in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def _put(file: BinaryIO, content: bytes) -> None:

@@ -388,11 +388,11 @@ def test_the_whole_case(make_run) -> None:
     assert found[2].startswith(
         "The tank measures 300 x 100 x 200 mm, its water stands 150 mm above"
     )
-    late = np.array(run.bodies.release_time)
+    late = np.array(run.bodies.entry_time)
     late[-1] = 6.5
-    object.__setattr__(run.bodies, "release_time", late)
+    object.__setattr__(run.bodies, "entry_time", late)
     words = run_words.blocks(run, LABORATORY)
-    assert words.endswith("Blocks waited for room: the last was let go at t = 6.5 s.")
+    assert words.endswith("Blocks waited for room: the last came at t = 6.5 s.")
 
 
 def test_stones_of_a_family_are_one_sentence() -> None:

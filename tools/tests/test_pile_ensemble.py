@@ -187,6 +187,13 @@ def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:
         pile_ensemble.open_ensemble(write_ensemble(tmp_path, []))
 
 
+def test_a_run_without_a_block_is_left_out(tmp_path: Path) -> None:
+    folder = write_ensemble(tmp_path, ENDS[:2])
+    with h5py.File(folder / "0001/result/run.h5", "r+") as h5:
+        h5["bodies/release_time"][:] = 1e9
+    assert pile_ensemble.open_ensemble(folder).left_out == {1: "no block in the tank", 3: "failed"}
+
+
 @pytest.mark.parametrize("text", ['{"format": "mics-ens', "{}", "[]", '{"format": "x"}'])
 def test_a_damaged_table_is_one_line(tmp_path: Path, text: str, capsys) -> None:
     (tmp_path / "ensemble.json").write_text(text)
@@ -226,10 +233,11 @@ def test_under_water_is_judged_by_the_level_of_the_end(
 
 
 def test_each_choice_has_its_own_numbers(tmp_path: Path, capsys) -> None:
-    """Choices share their drops, so no interval is taken over all of them."""
+    """Choices share their drops, so no interval is taken over all of them; no run of the third has
+    come to its end."""
     folder, name = write_ensemble(tmp_path, ENDS[:4], paper=True), "contact.friction"
     about = json.loads((folder / "ensemble.json").read_text())
-    about["choices"] = [{name: 0.4}, {name: 0.6}]
+    about["choices"] = [{name: 0.4}, {name: 0.6}, {name: 0.8}]
     for line in about["table"]:
         line[name] = 0.4 if line["run"] % 2 else 0.6
     (folder / "ensemble.json").write_text(json.dumps(about))
@@ -289,7 +297,8 @@ def test_what_is_taken_along_is_whole(report: Path) -> None:
     (table,) = re.findall(r'data:text/csv;base64,([^"]*)', text)
     assert len(base64.b64decode(table).decode().splitlines()) == 13
     (content,) = re.findall(r'data:application/json;base64,([^"]*)', text)
-    assert json.loads(base64.b64decode(content))["complete"] == 10
+    found = json.loads(base64.b64decode(content), parse_constant=pytest.fail)  # nan is no JSON
+    assert found["complete"] == 10
 
 
 def test_health_is_the_worst_of_all_runs(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from calls import ROOT, mics_tools
+from micstools.pages import run_page
 from micstools.piles import layer
 from micstools.reading import places, units
 from micstools.reading.overlap import Placed
@@ -142,6 +143,8 @@ def test_the_status_says_what_is_there(tmp_path: Path) -> None:
     found = places.places(Run(run.folder))
     assert [p.x == p.x for p in found] == [True] * 5 + [False] * 2
     assert [p.at_rest for p in found] == [1] * 5 + [0] * 2
+    told = run_page.page(Run(run.folder))
+    assert "one block is still to come" in told and "one block is left out or out of" in told
 
 
 def test_share_within_a_tolerance(run: Run) -> None:
@@ -286,6 +289,10 @@ def test_an_ensemble_in_the_survey(tmp_path: Path, capsys) -> None:
     assert cover.first == pytest.approx((100.0005, 200.0005)) and cover.spacing[0] == 0.001
     here = [round((v - cover.first[d]) / cover.spacing[d]) for d, v in ((0, 100.04), (1, 200.05))]
     assert cover.z[here[1], here[0]] == pytest.approx(1 / 6, abs=1e-5)
+    about = json.loads((folder / "ensemble.json").read_text()) | {"start": ["loads"]}
+    (folder / "ensemble.json").write_text(json.dumps(about))
+    assert mics_tools([*words, "--crs", "EPSG:25832"]) == 0
+    assert "no landings" in capsys.readouterr().out
 
 
 RADIUS = EDGE / 4  # of a ball of the diameter D_n/2

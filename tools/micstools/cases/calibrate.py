@@ -210,7 +210,9 @@ class Calibration:
             if str(group.get("name", "")).strip() == self.shape:
                 found = dict(group)
                 if "file" in found:
-                    found["file"] = str((self.beside / str(found["file"]).strip()).resolve())
+                    name = Path(str(found["file"]).strip())  # beside the case, or from here
+                    beside = self.beside / name
+                    found["file"] = str((beside if beside.is_file() else name).resolve())
                 return found
         names = ", ".join(str(group.get("name", "")) for group in shapes) or "none"
         raise BadRun(f"--shape {self.shape}: the case has no such &shape; it has: {names}")
@@ -228,10 +230,10 @@ class Calibration:
         plan.unlink(missing_ok=True)
         self._mics("--check", "--plan", str(plan), str(place))
         with h5py.File(plan) as h5:
-            points = h5[f"/shapes/{self.shape}/points"][()]
+            points = [shape["points"][()] for shape in h5["/shapes"].values()]  # of a family all
         place.unlink()
         plan.unlink()
-        return float(np.ptp(points, axis=0).max())
+        return max(float(np.ptp(one, axis=0).max()) for one in points)
 
     def _mics(self, *words: str) -> None:
         done = subprocess.run([self.mics, *words], capture_output=True, text=True)

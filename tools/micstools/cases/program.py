@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from micstools.cases import case_copy, settings
 from micstools.reading.reader import BadRun
@@ -65,3 +66,14 @@ def check(program: Path, text: str) -> str:
     if done.returncode:
         raise BadRun(done.stderr.strip() or f"{program} ended with code {done.returncode}")
     return done.stdout
+
+
+def wait(process: subprocess.Popen[Any]) -> int:
+    """Exit code of the program, as a shell would tell it; Ctrl-C reaches the program itself, which
+    writes a restart file before it ends."""
+    while True:
+        try:
+            code = process.wait()
+        except KeyboardInterrupt:
+            continue
+        return code if code >= 0 else 128 - code

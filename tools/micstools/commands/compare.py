@@ -3,14 +3,15 @@
 import argparse
 
 from micstools import command
-from micstools.piles import maps, pile_ensemble, pile_numbers
+from micstools.piles import maps, options, pile_ensemble, pile_numbers
 from micstools.reading import comparison, units
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
 
 
 def _numbers(run: Run) -> dict[str, float | str]:
-    return pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run)))
+    told = options.told(run.folder)
+    return pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run), told=told))
 
 
 def work(given: argparse.Namespace) -> int:

@@ -31,6 +31,9 @@ STOPPED = 130
 
 
 def _plan(given: argparse.Namespace) -> Plan:
+    for word in [*given.vary, *given.settings]:
+        if re.match(r"\s*drop\.seed\s*=", word):
+            raise BadRun(f"{word}: the seeds of all runs are drawn from --seed")
     text = program.case_text(given.case, given.settings)
     choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
     loads = tuple(str(load) for path in given.start for load in _loads(path))

@@ -3,7 +3,6 @@
 import argparse
 import json
 from dataclasses import asdict
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +47,7 @@ def work(given: argparse.Namespace) -> int:
         told = options.told(given.run, given)
         options.keep(told, given.run)
         box, area = box_of(given.box), area_of(told.area)
-        return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area))
+        return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area, told))
     return _of_run(given)
 
 
@@ -131,14 +130,5 @@ def _write_h5(path: Path, found: dict[str, Array]) -> None:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    files.write(path, json.dumps(known(content), indent=2, allow_nan=False) + "\n")
+    files.write(path, json.dumps(files.known(content), indent=2, allow_nan=False) + "\n")
     print(path)
-
-
-def known(value: Any) -> Any:
-    """The same without nan and infinite numbers, which JSON has not."""
-    if isinstance(value, dict):
-        return {k: known(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [known(v) for v in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

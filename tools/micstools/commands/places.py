@@ -101,6 +101,8 @@ def some(numbers: list[str]) -> str:
 
 def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options) -> int:
     """A table of all places, one of the landings of each unit; the other files for each choice."""
+    if drawn := sorted({"svg", "pdf"} & set(formats)):
+        raise BadRun(f"--to {','.join(drawn)}: drawings are of one run, not of an ensemble")
     whole, survey = pile_ensemble.open_ensemble(given.run), chosen.survey
     folder = given.out or whole.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -127,7 +129,8 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options)
         _draw(given, formats, survey, part, folder / stem, found)
     if "csv" in formats:
         print(files.write_table(folder / "places.csv", all_places))
-        print(files.write_table(folder / "landings.csv", all_landings))
+        if all_landings:
+            print(files.write_table(folder / "landings.csv", all_landings))
     write_json(folder / "places.json", {"survey": asdict(survey), "columns": places.MEANING,
                "ellipse": places.ELLIPSE, "choices": about})  # fmt: skip
     return 0

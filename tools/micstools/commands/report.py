@@ -15,7 +15,7 @@ def work(given: argparse.Namespace) -> int:
         handover.crs_name(given.crs)
     if pile_ensemble.is_ensemble(given.run):
         folder, told = given.run, options.told(given.run, given)
-        found = pile_ensemble.open_ensemble(folder, area=area_of(told.area))
+        found = pile_ensemble.open_ensemble(folder, area=area_of(told.area), told=told)
         text = ensemble_page.page(found, told)
     else:
         run = command.open_run(given.run)

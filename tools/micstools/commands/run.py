@@ -24,22 +24,12 @@ def call(given: argparse.Namespace, options: list[str], out: IO[str] | None = No
     environment = {**program.ENVIRONMENT, **os.environ}
     how: dict[str, Any] = {"text": True, "env": environment, "stdout": out}
     if not given.settings:
-        return _code(subprocess.Popen([path, *options, given.case], **how))
+        return program.wait(subprocess.Popen([path, *options, given.case], **how))
     with subprocess.Popen([path, *options], stdin=subprocess.PIPE, **how) as process:
         # The program has the signal, too, and ends in good order.
         with suppress(KeyboardInterrupt, BrokenPipeError):
             process.communicate(text)
-        return _code(process)
-
-
-def _code(process: subprocess.Popen[str]) -> int:
-    """Exit code of the program, as a shell would tell it; Ctrl-C reaches the program itself."""
-    while True:
-        try:
-            code = process.wait()
-        except KeyboardInterrupt:
-            continue
-        return code if code >= 0 else 128 - code
+        return program.wait(process)
 
 
 def work(given: argparse.Namespace) -> int:
@@ -55,7 +45,8 @@ def work(given: argparse.Namespace) -> int:
 
 def _page(given: argparse.Namespace) -> None:
     """The page of the run, opened where somebody sits before it."""
-    folder = given.output or folder_in(program.case_text(given.case, given.settings))
+    folder = given.output or (given.restart.parent if given.restart else None)
+    folder = folder or folder_in(program.case_text(given.case, given.settings))
     try:
         Parser("report").call([str(folder)])
     except BadRun as problem:

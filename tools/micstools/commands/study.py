@@ -36,7 +36,7 @@ def _run(path: Path, text: str, folder: Path, threads: int | None) -> Run:
     if _code(result) not in _ENDED:
         words: list[str | Path] = [path, "--output", result, "--quiet", case]
         words[1:1] = ["--threads", str(threads)] if threads is not None else []
-        code = subprocess.run(words).returncode
+        code = program.wait(subprocess.Popen(words))
         if code not in _ENDED:
             raise BadRun(f"{case}: the run ended with code {code}")
     return Run(result)

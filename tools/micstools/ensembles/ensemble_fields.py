@@ -60,7 +60,8 @@ def medians(table: Mapping[Member, State]) -> list[int]:
 def top_of_pile(run: Run) -> float:
     """Highest point at the end of what no table moves [m]."""
     pile = without_machines(run, present_bodies(run, -1))
-    return max(float(body.points[:, 2].max()) for body in pile.values())
+    tops = (float(body.points[:, 2].max()) for body in pile.values())
+    return max(tops, default=float(run.grid.low[2]))
 
 
 def numbered(numbers: Iterable[int]) -> str:

@@ -345,7 +345,7 @@ def _scenes(ensemble: Ensemble, north: float | None) -> dict[str, Any]:
 def _shown(p: Pile, ensemble: Ensemble) -> dict[str, Any]:
     scene = motion.blocks(p.run, np.array([len(p.run.bodies.time) - 1]))
     level = pile.still_level(p.run)
-    scene["water"] = None if level is None else {"level": level}
+    scene["water"] = None if level is None else {"level": level - float(p.run.grid.low[2])}
     n = p.numbers
     about = [f"seed {p.row['seed']}", f"ended: {p.row['outcome']}",
              f"at rest after {number(n.time_to_rest, '.3g', 's')}",
@@ -459,7 +459,7 @@ def _case(ensemble: Ensemble, run: Run) -> Markup:
 def _table(ensemble: Ensemble) -> Markup:
     """The figures of each run, and the files to take along."""
     found = pile_ensemble.rows(ensemble)
-    content = json.dumps(pile_ensemble.summary(ensemble), indent=1)
+    content = json.dumps(files.known(pile_ensemble.summary(ensemble)), indent=1)
     varied = sorted({name for choice in ensemble.choices for name in choice})
     shown, patterns = ensemble.units, ensemble.has_patterns
     rows: list[list[object]] = [

@@ -96,7 +96,7 @@ def outcome(run: Run, found: Found) -> str:
     """How the run ended, in a sentence or two."""
     b = run.bodies
     n, end = len(found.blocks), f"After {figure(float(b.time[-1]))} s "
-    missing = int((~b.fixed).sum()) - n
+    missing = int((~b.fixed & ~b.released(-1) & (b.status != 3)).sum())
     moving = sum(k.at_rest != k.at_rest for k in found.blocks)
     if missing:
         said = f"{end}{count(missing, 'block is', 'blocks are')} still to come and "
@@ -110,6 +110,8 @@ def outcome(run: Run, found: Found) -> str:
         said += "lies still" if n == 1 else "lie still"
     else:
         said = "All blocks are fixed"
+    if gone := int((b.status > 2).sum()):
+        said += f", {count(gone, 'block is', 'blocks are')} left out or out of the tank"
     low, ground = found.numbers.on_floor, _ground(run)
     return (
         f"{said}; the pile reaches {found.units.length.text(found.numbers.height)} above the "
@@ -135,7 +137,7 @@ def _facts(run: Run, found: Found) -> Markup:
             ("layer thickness", shown.length.text(n.layer_thickness),
              f"on average; porosity {percent(n.layer_porosity)}"),
             ("plan covered", shown.area.text(n.plan_area),
-             f"{percent(n.plan_area / n.footprint)} of a footprint of "
+             f"{percent(n.plan_area / (n.footprint or np.nan))} of a footprint of "
              f"{shown.area.text(n.footprint)}"),
             ("time to rest", shown.time.text(n.time_to_rest), f"of {shown.time.text(b.time[-1])}"),
             ("contacts per block", f"{n.coordination:.2f}", "with other blocks"),

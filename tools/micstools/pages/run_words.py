@@ -92,10 +92,10 @@ def blocks(run: Run, units: Units) -> str:
     said += [f"{count(free, 'free block')} from the case's &body"] if free else []
     said += drops(run, units)
     groups = run.parameters.get("drop", [])
-    last = max((t for t in b.release_time[b.dropped] if np.isfinite(t)), default=0.0)
+    last = max((t for t in b.entry_time[placed:] if np.isfinite(t)), default=0.0)
     listed = any(str(drop.get("file", "") or "").strip() for drop in groups)  # times are there
     if groups and not listed and last > 1e-9 + max(_due(drop)[-1] for drop in groups):
-        said.append(f"blocks waited for room: the last was let go at t = {figure(last)} s")
+        said.append(f"blocks waited for room: the last came at t = {figure(last)} s")
     return " ".join(capital(text) + "." for text in said)
 
 

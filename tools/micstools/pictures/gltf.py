@@ -116,7 +116,8 @@ def _animation(buffer: _Buffer, run: Run, rows: IntArray, times: Array) -> dict[
         if not there.all():
             size = np.where(there, 1.0, _GONE)
             add(k, "scale", np.repeat(size[:, None], 3, axis=1), "VEC3", "STEP")
-        if not b.fixed[k]:
+        moves = np.ptp(b.position[rows, k], 0).any() or np.ptp(b.quaternion[rows, k], 0).any()
+        if moves:
             add(k, "translation", b.position[rows, k] - run.grid.low, "VEC3")
             add(k, "rotation", _turns(b.quaternion[rows, k]), "VEC4")
     return {"name": "fall", "channels": channels, "samplers": samplers}

@@ -64,5 +64,6 @@ def told(folder: Path, words: Namespace | None = None) -> Options:
 def keep(found: Options, folder: Path) -> None:
     """For the next command; usual ones need no file."""
     known = {name: value for name, value in asdict(found).items() if value is not None}
-    if known:
-        files.write(folder / FILE, json.dumps(known, indent=2) + "\n")
+    path, text = folder / FILE, json.dumps(known, indent=2) + "\n"
+    if known and not (path.is_file() and path.read_text() == text):  # it may be on a read-only disk
+        files.write(path, text)

@@ -177,16 +177,16 @@ def at_rest(run: Run) -> Finding:
     """The blocks come to rest."""
     b, length = run.bodies, units.of_run(run).length
     found = rest.of_blocks(run)
-    waiting, out = int((~b.released(-1)).sum()), int((b.status == 4).sum())
+    waiting, out = int((~b.released(-1) & (b.status != 3)).sum()), int((b.status == 4).sum())
     worst = max(found, key=lambda one: one.moved, default=None)
     figures = "no free block"
     statement = "all blocks at rest in the end"
     if worst:
         figures = f"block {worst.block} moved most, by {length.text(worst.moved)} in "
         figures += f"{figure(worst.span)} s"
-        last = max(one.time for one in found)
-        if last == last and not waiting:
-            figures += f"; all at rest from t = {figure(last)} s on"
+        last = [one.time for one in found]
+        if not np.isnan(last).any() and not waiting:
+            figures += f"; all at rest from t = {figure(max(last))} s on"
         speed = figure(1e3 * float(run.value("run", "rest_speed")))
         statement += f" (slower than {speed} mm/s for {figure(worst.span)} s)"
     if waiting:

@@ -13,6 +13,7 @@ from micstools.ensembles.ensemble import OUTCOMES
 from micstools.piles import pile_numbers
 from micstools.piles.layer import nominal_diameter, parted
 from micstools.piles.maps import ground_map, top_of, usual_step
+from micstools.piles.options import Options
 from micstools.piles.pile import has_papers_blocks, still_level
 from micstools.piles.pile_numbers import PileNumbers
 from micstools.piles.placing import Area, Placing, drop_area, ends, placing
@@ -127,6 +128,7 @@ class Ensemble:
         return [
             replace(self, about=self.about | {"choices": [choice]}, piles=self.of(choice))
             for choice in self.choices
+            if self.of(choice)  # of others no run has come to its end
         ]
 
     @property
@@ -157,10 +159,11 @@ def open_ensemble(
     step: float | None = None,
     box: tuple[Array, Array] | None = None,
     area: Area | None = None,
+    told: Options = Options(),  # noqa: B008 (it is frozen)
 ) -> Ensemble:
     """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
     the tank; `box` is that of the porosity, by default the one around each pile; blocks should lie
-    in the `area`, by default that of the drops."""
+    in the `area`, by default that of the drops; layers as `told`."""
     said = about(folder / "ensemble.json")
     table = said["table"]
     done = [row for row in table if row["outcome"] in OUTCOMES]
@@ -169,7 +172,14 @@ def open_ensemble(
         raise BadRun(f"{folder} holds no run that came to its end")
     if step is None:
         step = usual_step(Run(folder / str(done[0]["folder"]) / "result"))
-    piles = [_pile(folder, row, step, box) for row in done]
+    piles = []
+    for row in done:
+        try:
+            piles.append(_pile(folder, row, step, box, told))
+        except BadRun:
+            left[int(row["run"])] = "no block in the tank"
+    if not piles:
+        raise BadRun(f"{folder} holds no run with a block in the tank at its end")
     return Ensemble(folder, said, piles, step, left, area or drop_area([p.run for p in piles]))
 
 
@@ -186,9 +196,10 @@ def about(path: Path) -> dict[str, Any]:
     return found
 
 
-def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
+def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None,
+          told: Options) -> Pile:  # fmt: skip
     run = Run(folder / str(row["folder"]) / "result")
-    found = pile_numbers.numbers(run, step, box=box)
+    found = pile_numbers.numbers(run, step, box=box, told=told)
     top = top_of(run, step)
     ground = ground_map(run, run.grid.low, run.grid.high, step)
     return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top, ground)

@@ -125,9 +125,11 @@ def planned(run: Run) -> Array:
 
 def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (it is frozen)
     """Every unit at the end of a run, in the order of their numbers."""
-    b, seen, plan = run.bodies, find_contacts(run, -1), planned(run)
+    b, plan = run.bodies, planned(run)
+    seen = find_contacts(run, len(b.time) - 1)
     present, shown = b.present(-1), survey.of(run.into_tank(plan))
-    level = np.where(present[:, None], survey.of(run.into_tank(b.position[-1])), math.nan)
+    ends = run.into_tank(plan) + b.position[-1] - plan  # a way through a period goes on
+    level = np.where(present[:, None], survey.of(ends), math.nan)
     away = np.linalg.norm((b.position[-1] - plan)[:, :2], axis=1)
     found = []
     for k, here in enumerate(present):

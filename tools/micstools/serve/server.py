@@ -239,7 +239,8 @@ def _print_another(site: Site) -> None:
 async def _open(site: Site) -> None:
     """Open the browser on a private file that sends it to us. The file lies in the home folder:
     browsers in a sandbox of their own see no folder of temporary files."""
-    with TemporaryDirectory(prefix="mics-page-", dir=Path.home()) as folder:
+    home = Path.home() if os.access(Path.home(), os.W_OK) else None
+    with TemporaryDirectory(prefix="mics-page-", dir=home) as folder:
         page = Path(folder, "open.html")
         page.touch(mode=0o600)
         page.write_text(_forward(site.address()))

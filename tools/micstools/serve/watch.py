@@ -19,7 +19,8 @@ from micstools.serve import living, watch_page
 from micstools.serve.server import Site, apart, foreign_answer, json_answer, order_of, page_answer
 
 MOST = 600  # rows of blocks that are read of a run
-MICS_TOOLS = (sys.executable, "-m", "micstools.cli")
+_START = "import sys; sys.path[:] = filter(None, sys.path)\nfrom micstools import cli; cli.main()"
+MICS_TOOLS = (sys.executable, "-c", _START)  # no module of the working folder is taken
 TOOLS = {
     "/report": ("report",),
     "/pdf": ("report", "--pdf"),

@@ -51,7 +51,8 @@ contains
     call check('the top layer belongs to those above', all(target_of(4, 5, top) == [4, 5, top + 1]))
     call check('at an edge to both beside it, most to the one along the normal', &
       merged%share(:3, merged%number(4, 6, top)), [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
-    call check('no profile at an edge', merged%r(:3, merged%number(4, 6, top)), spread(1.0_wp, 1, 3))
+    call check('no profile at an edge', merged%r(:3, merged%number(4, 6, top)), &
+               spread(1.0_wp, 1, 3))
     call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a small one', merged%r(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
