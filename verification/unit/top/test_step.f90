@@ -234,7 +234,7 @@ contains
     call tank('&drop shape="box" position=.06,.04,.1 lowering_speed=.3 release="set_down"/', sim, &
       'dt=.02 physics="dry"')
     up = 0.0_wp
-    do i = 1, 60
+    do i = 1, 45
       call run(sim, 1)
       up = max(up, sim%blocks%v(3, 1))
     end do
