@@ -162,7 +162,7 @@ contains
     bodies = '&shape name="raft" kind="box" size=.3,.3,.02/ ' &
       //body('raft', [0.5_wp, 0.5_wp, 0.01_wp])
     do i = 0, 99
-      bodies = bodies//body('cube', [0.37_wp, 0.37_wp, 0.0301_wp] &
+      bodies = bodies//body('cube', [0.37_wp, 0.37_wp, 0.03002_wp] &
         + [0.028_wp*modulo(i, 10), 0.028_wp*(i/10), 0.0_wp])
     end do
     threads = get_threads()
