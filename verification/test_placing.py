@@ -256,7 +256,7 @@ def test_set_down_on_a_slope(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "release", ["touch", "set_down", "set_down'  swivel = T  if_blocked = 'wait"]
+    "release", ["touch", "set_down", "set_down' swivel=T axis=1,1,0 angle_deg=20 attitude='given"]
 )
 def test_lowered_in_water_and_again_after_a_restart(release: str, tmp_path: Path) -> None:
     """The flow meets the held block as a moving body; a restart in the middle changes no bit."""
