@@ -68,6 +68,8 @@ def test_units_keep_their_names(drop: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "then" / "run.h5") as h5:
         assert [name.decode().strip() for name in h5["bodies/name"][:]] == ["A1", "B 2"]
+    done = mics(tmp_path, FILL + GRID + CUBE + "&start file = 'fill/run.h5' /\n" + drop)
+    assert done.returncode == 2 and "would be renamed" in done.stderr, "it could not be restarted"
 
 
 def test_other_shapes_are_refused(filled: Path) -> None:

@@ -68,7 +68,7 @@ contains
     logical :: beside
 
     path = file
-    if (index(file, '/') == 1 .or. .not. allocated(folder)) return
+    if (index(file, '/') == 1 .or. len_trim(file) == 0 .or. .not. allocated(folder)) return
     inquire (file=folder//file, exist=beside)
     if (beside) path = folder//file
   end function found_file
