@@ -29,7 +29,7 @@ program mics
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
   use start_bodies_m, only: read_start
-  use output_folder_m, only: check_folder
+  use output_folder_m, only: check_folder, same_folder
   use output_m, only: output_t, name_folder, open_output, write_due_output, close_output
   use restart_m, only: all_parameters, read_restart
   use diagnostics_m, only: step_report_t
@@ -152,9 +152,9 @@ contains
       call name_folder(case, options, what, path)
       call check_folder(what, path, code, message)
       if (code /= exit_ok) call problems%add_message(message)
-      if (any(index([character(4096) :: found_file(case%start%file), &
-        found_file(case%fluid%initial_state)], path//'/') == 1)) call problems%add(what, path, &
-        'would be renamed with the file that &start or &fluid initial_state names; take another')
+      message = found_file(case%start%file)
+      if (same_folder(path, message(:index(message, '/', back=.true.)))) call problems%add(what, &
+        path, 'would be renamed with the file that &start names; take another')
     end if
     there = .false.
     if (len(options%plan) > 0) inquire (file=options%plan, exist=there)

@@ -50,8 +50,9 @@ contains
     integer :: b, i
 
     released = .false.
-    if (.not. any(is_due(time, blocks))) return
-    due = pack([(b, b=1, blocks%n)], is_due(time, blocks))
+    due = pack([(b, b=1, blocks%n)], blocks%status == to_come .and. .not. blocks%present &
+               .and. has_come(blocks%release_time, time))
+    if (size(due) == 0) return
     waiting = are_waiting(time, blocks)
     given = blocks%x(3, :blocks%n)
     allocate (free(size(due)))
@@ -175,16 +176,6 @@ contains
       end associate
     end do
   end subroutine let_go_lowered
-
-  !> Which blocks are due and not there yet.
-  pure function is_due(time, blocks) result(due)
-    real(wp), intent(in) :: time   !! [s]
-    type(blocks_t), intent(in) :: blocks
-    logical :: due(blocks%n)
-
-    due = .not. blocks%present .and. blocks%status == to_come &
-          .and. has_come(blocks%release_time, time)
-  end function is_due
 
   !> Put due blocks into the order in which they are tried: as they are numbered, but of those that
   !! became due at the same time first those whose places exclude fewest of the others. What finds

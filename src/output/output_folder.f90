@@ -15,7 +15,7 @@ module output_folder_m
   use folder_lock_m, only: folder_lock_t, lock_name, stop_name, look_at_folder
   implicit none
   private
-  public :: check_folder, prepare_folder, continue_folder
+  public :: check_folder, prepare_folder, continue_folder, same_folder
 
   character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
     'blocks.vtkhdf']
@@ -126,6 +126,16 @@ contains
     write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as '//older
   end subroutine keep_old_results
 
+  !> Are these names of one folder? Device and inode tell.
+  logical function same_folder(one, other) result(same)
+    character(*), intent(in) :: one, other
+    integer(c_long) :: there(stat_size, 2)
+
+    same = one == other
+    if (c_stat(one//c_null_char, there(:, 1)) /= 0) return
+    if (c_stat(other//c_null_char, there(:, 2)) == 0) same = all(there(:2, 1) == there(:2, 2))
+  end function same_folder
+
   !> Make a folder and those around it, as far as they are missing.
   subroutine make_folder(path, code, message)
     character(*), intent(in) :: path
@@ -156,8 +166,6 @@ contains
     integer, intent(out) :: code
     character(:), allocatable, intent(out) :: message
     character(:), allocatable :: from
-    integer(c_long) :: there(stat_size, 2)
-    logical :: same   ! folder
     integer :: i, made
 
     code = exit_ok
@@ -166,11 +174,7 @@ contains
     if (index(restart, '/') > 0) from = trimmed(restart(:index(restart, '/', back=.true.)))
     path = from
     if (len(output) > 0) path = trimmed(output)
-    same = path == from
-    if (c_stat(path//c_null_char, there(:, 1)) == 0) then   ! device and inode tell
-      if (c_stat(from//c_null_char, there(:, 2)) == 0) same = all(there(:2, 1) == there(:2, 2))
-    end if
-    if (same) then
+    if (same_folder(path, from)) then
       if (is_root()) call lock%take(path, code, message)
       if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
