@@ -69,9 +69,10 @@ program mics
   call open_output(case, parameters, options, sim%run_state_t, bed, output)
   if (output%code /= exit_ok) call fatal(output%code, output%message)   ! what was written stays
   call measure(sim, report)
-  call measure_overlap(sim, report)
-  ! of a run that goes on, what was due has been written
-  if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
+  if (len(options%restart) == 0) then   ! of a run that goes on, what was due has been written
+    call measure_overlap(sim, report)
+    call write_due_output(sim%run_state_t, report, output)
+  end if
   stop_requests = stop_requests_t('', options%max_wall, began, last=wall_clock())
   call store_places(sim, fault)
   do while (.not. sim%clock%finished())

@@ -45,14 +45,15 @@ contains
     logical, intent(out) :: released         !! there was one
     integer, allocatable :: due(:)
     logical, allocatable :: free(:)
-    logical :: waiting(blocks%n)   ! they were warned of
+    logical, dimension(blocks%n) :: is_due, waiting   ! these were warned of
     real(wp) :: given(blocks%n), place   ! heights: of the case, and above what lies there [m]
     integer :: b, i
 
     released = .false.
-    due = pack([(b, b=1, blocks%n)], blocks%status == to_come .and. .not. blocks%present &
-               .and. has_come(blocks%release_time, time))
-    if (size(due) == 0) return
+    is_due = blocks%status == to_come .and. .not. blocks%present &
+             .and. has_come(blocks%release_time, time)
+    if (.not. any(is_due)) return
+    due = pack([(b, b=1, blocks%n)], is_due)
     waiting = are_waiting(time, blocks)
     given = blocks%x(3, :blocks%n)
     allocate (free(size(due)))

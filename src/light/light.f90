@@ -234,6 +234,7 @@ contains
     real(wp) :: residual, residual_before, level_before, step
     integer :: round
 
+    where (.not. blocks%present) light%wet = 0.0_wp   ! those that have left
     residual = level_residual()
     step = residual
     do round = 1, max_rounds
@@ -251,7 +252,6 @@ contains
       integer :: b
 
       do b = 1, blocks%n
-        if (.not. blocks%present(b)) light%wet(b) = 0.0_wp
         if (.not. blocks%present(b)) cycle
         if (blocks%asleep(b) .and. abs(light%level - light%cut_at(b)) <= 0.0_wp) cycle
         call submerge(blocks, b, light%level, light%wet(b), light%moment(:, b))

@@ -191,7 +191,7 @@ contains
     integer :: m, f(3)
 
     spacing = cube_root(grid%volume)
-    if (any(grid%n == 1)) spacing = sqrt(product(grid%h, grid%n > 1))   ! a slice
+    if (count(grid%n > 1) == 2) spacing = sqrt(product(grid%h, grid%n > 1))   ! a slice
     found%n = 2*solid%n_link
     allocate (found%cell(3, found%n), found%k(found%n), found%arm(3, found%n))
     !$omp parallel do private(f) schedule(static)

@@ -163,7 +163,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(rigid_motion_t), intent(in) :: bodies
     type(pressure_system_t), intent(inout) :: self
-    real(wp), parameter :: rounding = 1.0e-9_wp   !! [face, cell]
+    real(wp), parameter :: rounding = 1.0e-9_wp   !! [area of a face, volume of a cell]
 
     associate (op => self%operator, work => self%solver%work)
       op%bodies = bodies

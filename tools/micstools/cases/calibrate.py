@@ -17,7 +17,7 @@ import f90nml
 import h5py
 import numpy as np
 
-from micstools.cases import settings
+from micstools.cases import program
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array
 
@@ -108,8 +108,7 @@ class Calibration:
     def __init__(self, mics: Path, case: Path, shape: str, folder: Path, threads: int = 1) -> None:
         """Find the size of the shape; nothing has fallen yet."""
         self.mics, self.folder, self.threads, self.shape = mics, folder, threads, shape
-        self.beside = case.resolve().parent
-        self.case = f90nml.reads(settings.read(case))
+        self.case = f90nml.reads(program.case_text(case, []))
         folder.mkdir(parents=True, exist_ok=True)
         self.length = 1.0
         self.length = self._extent()
@@ -210,9 +209,7 @@ class Calibration:
             if str(group.get("name", "")).strip() == self.shape:
                 found = dict(group)
                 if "file" in found:
-                    name = Path(str(found["file"]).strip())  # beside the case, or from here
-                    beside = self.beside / name
-                    found["file"] = str((beside if beside.is_file() else name).resolve())
+                    found["file"] = str(Path(str(found["file"]).strip()).resolve())
                 return found
         names = ", ".join(str(group.get("name", "")) for group in shapes) or "none"
         raise BadRun(f"--shape {self.shape}: the case has no such &shape; it has: {names}")

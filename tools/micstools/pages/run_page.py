@@ -96,7 +96,7 @@ def outcome(run: Run, found: Found) -> str:
     """How the run ended, in a sentence or two."""
     b = run.bodies
     n, end = len(found.blocks), f"After {figure(float(b.time[-1]))} s "
-    missing = int((~b.fixed & ~b.released(-1) & (b.status != 3)).sum())
+    missing = int((b.to_come(-1) & ~b.fixed).sum())
     moving = sum(k.at_rest != k.at_rest for k in found.blocks)
     if missing:
         said = f"{end}{count(missing, 'block is', 'blocks are')} still to come and "

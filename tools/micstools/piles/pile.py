@@ -177,7 +177,7 @@ def at_rest(run: Run) -> Finding:
     """The blocks come to rest."""
     b, length = run.bodies, units.of_run(run).length
     found = rest.of_blocks(run)
-    waiting, out = int((~b.released(-1) & (b.status != 3)).sum()), int((b.status == 4).sum())
+    waiting, out = int(b.to_come(-1).sum()), int((b.status == 4).sum())
     worst = max(found, key=lambda one: one.moved, default=None)
     figures = "no free block"
     statement = "all blocks at rest in the end"

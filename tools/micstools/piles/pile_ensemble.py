@@ -174,9 +174,10 @@ def open_ensemble(
         step = usual_step(Run(folder / str(done[0]["folder"]) / "result"))
     piles = []
     for row in done:
-        try:
-            piles.append(_pile(folder, row, step, box, told))
-        except BadRun:
+        run = Run(folder / str(row["folder"]) / "result")
+        if parted(run)[0]:
+            piles.append(_pile(run, row, step, box, told))
+        else:
             left[int(row["run"])] = "no block in the tank"
     if not piles:
         raise BadRun(f"{folder} holds no run with a block in the tank at its end")
@@ -196,9 +197,8 @@ def about(path: Path) -> dict[str, Any]:
     return found
 
 
-def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None,
+def _pile(run: Run, row: dict[str, Any], step: float, box: tuple[Array, Array] | None,
           told: Options) -> Pile:  # fmt: skip
-    run = Run(folder / str(row["folder"]) / "result")
     found = pile_numbers.numbers(run, step, box=box, told=told)
     top = top_of(run, step)
     ground = ground_map(run, run.grid.low, run.grid.high, step)

@@ -95,7 +95,7 @@ def numbers(
     row = row % len(b.time)
     bodies, seen = present_bodies(run, row), find_contacts(run, row)
     bodies = without_machines(run, bodies)
-    if not bodies or not layer.parted(run, row)[0]:
+    if not layer.parted(run, row)[0]:
         raise BadRun(f"{run.folder}: no block is let go at t = {b.time[row]:g} s: there is no pile")
     blocks = images(run, bodies.values())
     top = height_map(blocks, run.grid.low, run.grid.high, step)

@@ -90,7 +90,7 @@ def deepest(found: Overlap) -> str:
 def _rest(run: Run, units: Units) -> list[Check]:
     """One check, where there are free blocks."""
     b = run.bodies
-    waiting = [int(k) + 1 for k in b.dropped if not b.released(-1)[k] and b.status[k] != 3]
+    waiting = [int(k) + 1 for k in b.dropped if b.to_come(-1)[k]]
     found = rest.of_blocks(run)
     if not found and not waiting:
         return []

@@ -125,6 +125,10 @@ class Bodies:
         """Which bodies have been released until a row, also those out of the tank since (N)."""
         return np.asarray(self.release_time <= self.time[row] + 1e-12)
 
+    def to_come(self, row: int) -> NDArray[np.bool_]:
+        """Which bodies are not released yet at a row, without those that were left out (N)."""
+        return np.asarray(~self.released(row) & (self.status != 3))
+
     def present(self, row: int) -> NDArray[np.bool_]:
         """Which bodies are released and in the tank at a row (N)."""
         return np.asarray(self.released(row) & (self.exit_time > self.time[row]))
