@@ -126,12 +126,12 @@ contains
     write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as '//older
   end subroutine keep_old_results
 
-  !> Are these names of one folder? Device and inode tell.
+  !> Are these names of one folder that is there? Device and inode tell.
   logical function same_folder(one, other) result(same)
     character(*), intent(in) :: one, other
     integer(c_long) :: there(stat_size, 2)
 
-    same = one == other
+    same = .false.
     if (c_stat(one//c_null_char, there(:, 1)) /= 0) return
     if (c_stat(other//c_null_char, there(:, 2)) == 0) same = all(there(:2, 1) == there(:2, 2))
   end function same_folder
