@@ -73,10 +73,15 @@ class Studio {
     return this.edit({ op: 'set', group, n: +n, variable, value: field.value }, field);
   }
 
-  // Changes are sent one after another. One of a field counts for the groups that it was made for.
+  // Changes, Save and Run are sent one after another: an answer may not come after a later one.
+  inLine(work) {
+    return this.line = (this.line || Promise.resolve()).then(work).catch(problem => tell(problem.message));
+  }
+
+  // A change of a field counts for the groups that it was made for.
   edit(order, field) {
     const made = this.groups;
-    this.line = (this.line || Promise.resolve()).then(async () => {
+    return this.inLine(async () => {
       try {
         const was = this.groups;
         if (order.op === 'set' && made !== was) throw new Error(`not changed: ${order.variable}, for the groups are others now`);
@@ -94,7 +99,6 @@ class Studio {
       }
       this.check();
     });
-    return this.line;
   }
 
   // Asks for something that is based on the text of this page. Where another window has changed that,
@@ -260,14 +264,12 @@ class Studio {
     }
     document.getElementById('many').close();
     tell('…');
-    try {
+    await this.inLine(async () => {
       const { told, open } = await this.post(path, { threads: threads.value, runs: runs.value, spread: spread.value });
       tell(told);
       if (open) location.assign(open);
       else this.take(await ask('draft'));
-    } catch (problem) {
-      tell(problem.message);
-    }
+    });
   }
 }
 
