@@ -7,7 +7,6 @@ import numpy as np
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, below_plane
-from worlds import draw
 from worlds.world import Broken, World
 
 ROUND_OFF = 1e-12  # of the liquid
@@ -40,53 +39,6 @@ def lies_still(world: World, folder: Path) -> None:
     """Around free ones that lie on the floor and on each other it moves as their contacts load."""
     run = world.run(folder, ends=(0,))
     below("kinetic energy of the fluid over rho g h^4", motion(world, run), LOADING)
-
-
-def honey() -> World:
-    """Level honey that hardly moves, under a gas nearly as dense."""
-    return World(
-        [
-            ("run", {"t_end": 0.15, "dt": 7.8e-3, "field_interval": 0.0, "restart_interval": 0.0}),
-            ("grid", {"cells": [2, 16, 11], "length": [7.19e-3, 0.0432012, 0.0320265]}),
-            ("boundary", {"x_min": "slip", "x_max": "slip", "y_min": "periodic",
-                          "y_max": "periodic"}),
-            ("fluid", {"liquid_density": 700.0, "gas_density": 583.0, "liquid_viscosity": 10.0,
-                       "water_level": 0.02287795, "velocity": [0.0, 1e-6, 1e-6]}),
-        ]
-    )  # fmt: skip
-
-
-def landing() -> World:
-    """A sphere that lands on the floor in thick oil and presses out what is below it."""
-    sphere = {"shape": "s", "position": [0.064211, 0.0554631, 0.0628113],
-              "velocity": [-0.197358, -0.116621, -0.0448541], "quaternion": [9.0, 6.0, 6.0, 0.0],
-              "angular_velocity": [-4.48638785, 2.08296579, 2.40342206]}  # fmt: skip
-    return World(
-        [
-            ("run", {"t_end": 0.2, "dt": 0.01, "field_interval": 0.0, "restart_interval": 0.0}),
-            ("grid", {"cells": [11, 7, 14], "length": [0.239931, 0.114717, 0.23406]}),
-            ("boundary", draw.ALONG_X),
-            ("fluid", {"liquid_density": 700.0, "liquid_viscosity": 0.56234, "gas_density": 0.84,
-                       "water_level": 0.11703}),
-            ("contact", {"model": "spheres", "contact_time": 2.8e-3, "restitution": 0.275}),
-            ("shape", {"name": "s", "kind": "sphere", "size": 0.093313, "density": 2492.8,
-                       "refinement": 1}),
-            ("body", sphere),
-        ]
-    )  # fmt: skip
-
-
-def lying_cube(quaternion: list[float]) -> World:
-    """A cube of 1 m that sinks onto the floor, cells of .2 m, from .3 m above it."""
-    return World(
-        [
-            ("run", {"t_end": 2.0, "dt": 0.01, "field_interval": 0.0, "restart_interval": 0.0}),
-            ("grid", {"cells": [15, 15, 12], "length": [3.0, 3.0, 2.4]}),
-            ("fluid", {"water_level": 2.1}),
-            ("shape", {"name": "c", "kind": "cube", "size": 1.0, "density": 2300.0}),
-            ("body", {"shape": "c", "position": [1.53, 1.47, 0.8], "quaternion": quaternion}),
-        ]
-    )
 
 
 def motion(world: World, run: Run) -> Array:
@@ -122,6 +74,7 @@ def balance(world: World, folder: Path) -> None:
         below("overlap over the thinnest block", s.max_overlap / thinnest, PUSHED)
     free = ~b.fixed & (b.entry_time <= b.release_time)
     there = (b.release_time < b.time[:-1, None]) & free  # a release gives velocity in its step
+    there &= b.time[1:, None] <= b.exit_time
     dt = np.diff(b.time)[:, None, None]
     force = (b.fluid_force + b.contact_force)[1:] + b.mass[:, None] * run.gravity
     pull = b.mass[:, None] * np.diff(b.velocity, axis=0) / dt

@@ -341,3 +341,25 @@ def world(
     if special != "survey":
         return found
     return found.shifted([across * draw(st.integers(-9, 9)), 3e5 * across, 5e6 * across])
+
+
+@st.composite
+def busy(draw: Draw, kinds: tuple[str, ...] = ("coupled", "dry", "light")) -> World:
+    """Such worlds whose blocks come late, held ones too, wait for room, hang in slings until they
+    stand, and leave through the sides of x."""
+    found = draw(world(kinds))
+    t_end, speed = found.value("run", "t_end"), 1e3 * found.value("run", "rest_speed")
+    if draw(st.booleans()) and found.value("boundary", "x_max") != "outflow":
+        found = found.changed("boundary", x_min="outflow", x_max="outflow")
+    for name, block in found.groups:
+        if "velocity" in block and "shape" in block:
+            block["velocity"][0] += speed * draw(around(1.0))
+        if name == "body":
+            block["release_time"] = draw(one_of(0.0, 0.3 * t_end, 0.7 * t_end))
+        elif name == "drop":
+            block |= {"if_blocked": draw(one_of("wait", "raise", "skip")),
+                      "count": draw(st.integers(1, 3)), "interval": 0.3 * t_end}  # fmt: skip
+        if "lowering_speed" in block and draw(st.booleans()):
+            block.pop("release_height", None)
+            block |= {"release": "set_down", "swivel": draw(st.booleans())}
+    return found

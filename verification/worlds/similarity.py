@@ -11,54 +11,6 @@ FROUDE = (4.0, 2.0, 64.0)
 """Length, time, mass: other sizes under the same gravity, of the same densities."""
 CLOCK = ("series/wall_time", "timers/seconds")
 
-SAME_FLUIDS = {"liquid_density": 1000.0, "liquid_viscosity": 1e-3, "gas_density": 1.25,
-               "gas_viscosity": 1.8e-5, "gravity": [0.0, 0.0, -9.8125]}  # fmt: skip
-PAIRS = {
-    "falling": {},
-    "c_ismac": {"momentum": "c_ismac"},
-    "mics": {"coupling": "mics"},
-    "light": {},
-    "held": {},
-}
-"""Worlds that showed all that broke the law at first, and their &numerics."""
-
-
-def pair(name: str) -> World:
-    """Hexapods that fall on a held one in shallow water; a dam break on the held one."""
-    falls = [
-        ([0.155, 0.085, 0.13], [3.0, 1.0, 2.0], 70.0),
-        ([0.08, 0.075, 0.2], [1.0, 1.0, 2.0], 20.0),
-    ]
-    held = ([0.15, 0.08, 0.04], [1.0, 2.0, 3.0], 40.0)
-    dam = {"min": [0.0, 0.0, 0.0], "max": [0.1, 0.16, 0.17]}
-    run = {"physics": "light" if name == "light" else "coupled", "t_end": 0.4, "dt": 0.02}
-    return World(
-        [
-            ("run", {**run, "cfl_max": 1.0, "field_interval": 0.0, "restart_interval": 0.0}),
-            ("grid", {"cells": [30, 16, 26], "length": [0.3, 0.16, 0.26]}),
-            ("fluid", SAME_FLUIDS | ({} if name == "held" else {"water_level": 0.15})),
-            *([("water", dam)] if name == "held" else []),
-            ("numerics", {"divergence_tolerance": 1e-6, **PAIRS[name]}),
-            ("contact", {"contact_time": 2e-3}),
-            ("shape", {"name": "b", "kind": "hexapod", "size": 0.02, "density": 2300.0}),
-            *(("body", {"shape": "b", "fixed": place is held, "position": place[0],
-                        "axis": place[1], "angle_deg": place[2]})
-              for place in [held, *([] if name == "held" else falls)]),
-        ]
-    )  # fmt: skip
-
-
-def calm() -> World:
-    """Water alone, level inside a cell: what moves is round-off."""
-    ends = {f"{d}_{s}": "periodic" for d in "xy" for s in ("min", "max")} | {"z_max": "slip"}
-    thin = {"gas_density": 0.6, "gas_viscosity": 1e-3, "water_level": 2.21875875}
-    thick = {"liquid_density": 3000.0, "liquid_viscosity": 7.2e-4, "gravity": [0.0, 0.0, -9.8125]}
-    jacobi = {"advection": "upwind", "preconditioner": "jacobi", "divergence_tolerance": 1e-6}
-    run = {"physics": "fluid", "t_end": 0.2, "dt": 0.0675, "restart_interval": 0.0}
-    grid = {"cells": [15, 12, 10], "length": [4.31109, 4.93493, 5.00002]}
-    return World([("run", run), ("grid", grid), ("boundary", ends), ("fluid", thin | thick),
-                  ("numerics", jacobi)])  # fmt: skip
-
 
 def froude(world: World, folder: Path) -> None:
     """Lengths times 4, times and speeds times 2, viscosities times 8, tension times 16."""

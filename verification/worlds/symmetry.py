@@ -21,21 +21,6 @@ POLAR = ("velocity", "fluid_force", "contact_force")
 AXIAL = ("angular_velocity", "fluid_torque", "contact_torque")
 
 
-def spinning() -> World:
-    """A thin box that spins about a skew axis in a tank full of liquid."""
-    q, spin = [2.0, -5.0, -3.0, -5.0], [8.0, -18.0, -12.0]
-    body = {"fixed": True, "position": [0.038, 0.031, 0.034], "quaternion": q}
-    return World(
-        [
-            ("run", {"t_end": 0.012, "dt": 3e-3, "field_interval": 0.0, "restart_interval": 0}),
-            ("grid", {"cells": [16, 12, 14], "length": [0.08, 0.06, 0.07]}),
-            ("fluid", {"single_phase": True, "liquid_density": 1000.0}),
-            ("shape", {"name": "b", "kind": "box", "size": [0.02, 0.015, 6e-3], "density": 2e3}),
-            ("body", {"shape": "b", **body, "angular_velocity": spin}),
-        ]
-    )
-
-
 def changed(world: World, q: Array) -> World:
     """The world whose places and directions are those of `q` times its own; in a mirror for shapes
     that are their own mirror image."""

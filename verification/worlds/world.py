@@ -11,6 +11,7 @@ from typing import Any
 import hypothesis
 import numpy as np
 
+from micstools.cases import settings
 from micstools.cases.case import schema
 from micstools.reading.reader import Run
 from run_cases import Machine
@@ -47,6 +48,12 @@ class World:
 
     groups: list[tuple[str, Group]]
     tables: dict[str, Table] = field(default_factory=dict)
+
+    @classmethod
+    def known(cls, name: str) -> "World":
+        """A world that is kept as a case file, for what it once showed."""
+        text = (Path(__file__).parent / "known" / f"{name}.nml").read_text()
+        return cls([(n, settings.variables(text[a:b])) for n, a, b in settings.groups(text)])
 
     def value(self, group: str, name: str, default: Any = None) -> Any:
         """A variable of the first such group."""
