@@ -303,6 +303,20 @@ def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) ->
         assert (one.time == two.time).all() and (one.position == two.position).all()
 
 
+def test_ctrl_c_in_python_waits_for_the_restart_file(tmp_path: Path) -> None:
+    """It takes a second; `subprocess.run` gives the program a quarter of it."""
+    file_to_call(tmp_path / "slow", "#!/bin/sh\ntrap 'sleep 1; touch written; exit 130' INT\n"
+                 "cat > began\nwhile :; do sleep 0.1; done\n")  # fmt: skip
+    (tmp_path / "case.nml").write_text(CASE)
+    words = "from micstools import Case; Case.read('case.nml').run('out', mics='./slow')"
+    with going_on(sys.executable, "-c", words, cwd=tmp_path, start_new_session=True,
+                  stderr=subprocess.PIPE, preexec_fn=ctrl_c_counts) as running:  # fmt: skip
+        until(lambda: (tmp_path / "began").exists() and (tmp_path / "began").read_text())
+        os.killpg(running.pid, signal.SIGINT)
+        assert b"KeyboardInterrupt" in running.communicate(timeout=60)[1]
+    assert (tmp_path / "written").exists()
+
+
 @pytest.fixture
 def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The commands of two systems of queues."""

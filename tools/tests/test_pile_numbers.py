@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calls import mics_tools
-from micstools.piles import layer, maps, pile_form, pile_numbers
+from micstools.piles import layer, maps, pile_form, pile_numbers, placing
 from micstools.piles.maps import height_map
 from micstools.reading import block_numbers
 from micstools.reading.overlap import Placed, find_contacts, present_bodies, sphere_gap
@@ -170,6 +170,8 @@ def test_blocks_touch_and_cover_through_a_periodic_side(make_run, capsys) -> Non
     found = pile_numbers.numbers(run, 0.001)
     assert found.plan_area - bare.plan_area == pytest.approx(2 * 0.02**2, rel=0.06)
     assert 0.0 < found.porosity < 1.0
+    beside = make_run(cubes((0.295, 0.05, 0.01), (0.315, 0.05, 0.01), motion=periodic))
+    assert placing.ends(beside)[:, 0] == pytest.approx([0.295, 0.315])  # not at both ends
 
 
 def test_contact_spheres_touch_where_they_are(make_run) -> None:

@@ -249,12 +249,17 @@ class Case:
         words = [str(self._program(mics)), "--output", str(folder)]
         words += ["--threads", str(threads)] if threads else []
         words += ["--quiet"] if quiet else []
-        done = subprocess.run(words, input=self._here(), stderr=subprocess.PIPE, text=True,
-                              stdout=subprocess.DEVNULL if quiet else None)  # fmt: skip
+        how: dict[str, Any] = {"stdout": subprocess.DEVNULL if quiet else None, "text": True}
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, **how) as done:
+            try:
+                said = done.communicate(self._here())[1].strip()
+            except KeyboardInterrupt:
+                program.wait(done)  # it has the signal, too, and writes a restart file
+                raise
         if done.returncode in (2, 4) or not (folder / "run.h5").is_file():
-            raise BadRun(done.stderr.strip() or f"mics ended with code {done.returncode}")
-        if done.stderr.strip():
-            print(done.stderr.strip(), file=sys.stderr)
+            raise BadRun(said or f"mics ended with code {done.returncode}")
+        if said:
+            print(said, file=sys.stderr)
         return Run(folder)
 
     def ensemble(self, runs: int, out: str | Path = "mics-ensemble", jobs: int | None = None,

@@ -37,7 +37,7 @@ def find(given: Path | None = None, case: Path | None = None) -> Path:
 
 def _named(name: str, words: str) -> Path:
     """A program by its path, or by its name on the PATH."""
-    found = shutil.which(name)
+    found = shutil.which(Path(name).absolute()) or shutil.which(name)
     if found is None:
         raise BadRun(f"{words}: is no program")
     return Path(found).resolve()

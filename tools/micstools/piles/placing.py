@@ -46,8 +46,17 @@ class Placing:
 
 
 def ends(run: Run) -> Array:
-    """Centroids (n, 2) [m] of the released free blocks at the end."""
-    return np.asarray(run.into_tank(run.bodies.position[-1])[_released(run), :2])
+    """Centroids (n, 2) [m] of the released free blocks at the end; ways through a period go on."""
+    start = _starts(run)
+    way = run.bodies.position[-1, _released(run)] - start
+    return np.asarray((run.into_tank(start) + way)[:, :2])
+
+
+def _starts(run: Run) -> Array:
+    """Where they are let go (n, 3) [m]."""
+    b, which = run.bodies, _released(run)
+    rows = np.searchsorted(b.time, b.release_time[which] - 1e-12)
+    return np.asarray(b.position[np.minimum(rows, b.time.size - 1), which])
 
 
 def waiting(run: Run) -> int:
@@ -62,14 +71,10 @@ def _released(run: Run) -> Array:
 
 def drop_area(runs: Sequence[Run]) -> Area:
     """The rectangle around all places where blocks are let go, half a block larger on each side."""
-    starts, margin = [], 0.0
-    for run in runs:
-        b = run.bodies
-        for k in _released(run):
-            row = min(int(np.searchsorted(b.time, b.release_time[k] - 1e-12)), b.time.size - 1)
-            starts.append(run.into_tank(b.position[row, k])[:2])
-            margin = max(margin, run.shapes[b.shape[k]].length / 2)
-    if not starts:
+    starts = np.concatenate([run.into_tank(_starts(run))[:, :2] for run in runs])
+    shapes = [run.shapes[run.bodies.shape[k]] for run in runs for k in _released(run)]
+    margin = max((shape.length / 2 for shape in shapes), default=0.0)
+    if not shapes:
         return Area((np.nan, np.nan), (np.nan, np.nan), False)
     low, high = np.min(starts, axis=0) - margin, np.max(starts, axis=0) + margin
     return Area((float(low[0]), float(low[1])), (float(high[0]), float(high[1])), False)
