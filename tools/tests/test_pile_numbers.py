@@ -253,18 +253,13 @@ def test_outline_of_a_ring_of_cubes() -> None:
     blocks = [cube_at(low[0] + 0.02 + EDGE * i, low[1] + 0.02 + EDGE * j, 0.01) for i, j in places]
     top = height_map(blocks, low, low + [0.15, 0.1, 0.1], STEP)
     found = pile_form.outline(top, low, STEP)
-    areas = sorted(_area(line) for line in found)
+    sums = (a[:-1, 0] * a[1:, 1] - a[:-1, 1] * a[1:, 0] for a in found)  # positive on the left
+    areas = sorted(0.5 * float(one.sum()) for one in sums)
     assert areas == pytest.approx([-(EDGE**2), EDGE**2, 9 * EDGE**2], abs=3 * STEP**2)
     everything = np.concatenate(found)
     assert everything.min(axis=0) == pytest.approx(low[:2] + 0.01, abs=1e-9)
     assert everything.max(axis=0) == pytest.approx(low[:2] + [0.11, 0.07], abs=1e-9)
     assert all((line[0] == line[-1]).all() for line in found)
-
-
-def _area(line: np.ndarray) -> float:
-    """Enclosed, positive when it lies to the left [m2]."""
-    (x, y), (u, v) = line[:-1].T, line[1:].T
-    return 0.5 * float((x * v - u * y).sum())
 
 
 def test_footprint_and_layer() -> None:

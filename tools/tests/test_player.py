@@ -252,6 +252,15 @@ def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) 
         assert np.ptp(colours, axis=0).max() <= 2, yaw
 
 
+def test_what_plays_on_after_a_load_keeps_its_pace(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    browser.run("for (let k = 0; k < 9; k++) { runPlayer.play(); runPlayer.pause(); }")
+    now = "runPlayer.stage.time - performance.now() / 1000 * +runPlayer.pace.value"
+    wait = "new Promise(done => setTimeout(done, 600))"
+    gained = browser.run(f"runPlayer.play(); start = {now}; {wait}.then(() => {now} - start)")
+    assert gained < 0.3 * browser.run("+runPlayer.pace.value")
+
+
 def test_a_block_crosses_a_periodic_side(browser: Browser, page: Path) -> None:
     """Between two frames it does not fly back through the tank."""
     browser.open(page)

@@ -305,7 +305,9 @@ def test_a_run_that_was_killed_does_not_run(folder: Path) -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)
         found = living.state(Run(folder))
         assert (found.words, found.running) == ("running", True)
+        before = living.holder(folder / "run.lock")
         assert living.ask_to_stop(folder) and (folder / "stop").exists()
+    assert living.state(Run(folder), before).running  # it ended since that was looked at
 
 
 def test_another_program_is_not_stopped(folder: Path) -> None:
@@ -539,6 +541,8 @@ def test_a_case_of_somebody_else_is_not_overwritten(draft: Draft) -> None:
     draft.case.write_text(CASE)
     draft.save()
     assert "t_end = 2" in draft.case.read_text() and draft.state()["saved"]
+    draft.edit({"op": "text", "text": CASE.replace(" = ", "\u00a0= ")})  # as pasted from a page
+    assert draft.save() == draft.save()
 
 
 def test_one_run_at_a_time(case: Path) -> None:
@@ -594,11 +598,34 @@ def test_a_studio_begun_anew_goes_on(case: Path) -> None:
         assert post(site, "/stop", how="restart")[0] == 200
         until(lambda: living.holder(folder / "run.lock") is None)
     with serving(site := studio.site_of(case, MICS)):
-        assert "Stopped at t" in json.loads(request(site, "/live")[2])["parts"]["state"]
-        assert post(site, "/go-on")[0] == 200
+        assert "Stopped at t" in told(site)
+        other = {"group": "run", "n": 0, "variable": "output", "value": "other"}
+        assert post(site, "/edit", op="set", number=0, **other)[0] == 200
+        assert post(site, "/save", number=1)[0] == 200
+        assert post(site, "/go-on")[0] == 200  # where it stopped
+        until(lambda: "Running at t" in told(site))
         until(lambda: living.holder(folder / "run.lock"))
-        assert post(site, "/run", number=0)[0] == 422
+        assert post(site, "/run", number=1)[0] == 422
         assert post(site, "/stop", how="now")[0] == 200
+
+
+def told(site: Site) -> str:
+    return str(json.loads(request(site, "/live")[2])["parts"]["state"])
+
+
+def test_older_results_are_not_those_of_a_new_run(case: Path, tmp_path: Path) -> None:
+    """Its program has not begun, is stopped, or dies before."""
+    case.write_text(CASE.replace("t_end = 500", "t_end = 0.02"))
+    first = tmp_path / "first"
+    text = f'#!/bin/sh\n[ "$1" = --quiet ] && . {first}\nexec {MICS} "$@"\n'
+    with serving(site := studio.site_of(case, program(tmp_path / "mics", text))):
+        for does, says in (("", "Finished"), ("exec sleep 99", "Waiting"), ("exit 5", "code 5")):
+            first.write_text(does)
+            assert post(site, "/run", number=0)[0] == 200
+            until(lambda: says in told(site))  # noqa: B023
+            if says == "Waiting":
+                assert "before it begins" in post(site, "/stop", how="now")[1]["told"]
+                until(lambda: "code -15" in told(site))
 
 
 ODD = ["two words", "it's", 'a "b"', "a;touch b", "$(touch b)", "`touch b`", "a&b", "<b>", "ä\\n"]
@@ -707,6 +734,7 @@ def test_a_case_is_edited_run_stopped_and_reported(case: Path, browser: Browser)
         browser.run("document.querySelector('[data-remove=drop][data-n=\"1\"]').click()")
         until(lambda: browser.run(f"{field('drop-1-count')} === null"))
         until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        browser.run(f"{field('runs')}.value = 0")  # no matter of one run
         browser.run(f"{field('run')}.click()")
         until(lambda: browser.run("location.pathname") == "/watch")
         until(lambda: "Running at t" in browser.run("document.body.innerText"))

@@ -46,14 +46,9 @@ LAWS: dict[str, Law] = {
     "tool": (draw.world(), indifference.tool),
     "machine": (draw.world(), indifference.machine),
     "restart": (draw.world(), indifference.restart),
-    "busy": (draw.busy(), balance.balance),
-    "busy_froude": (draw.busy(), similarity.froude),
-    "busy_looks": (draw.busy(), indifference.looks),
-    "busy_machine": (draw.busy(), indifference.machine),
-    "busy_moved": (draw.busy(), symmetry.moved),
-    "busy_order": (draw.busy(), indifference.order),
-    "busy_restart": (draw.busy(), indifference.restart),
 }
+BUSY = ("balance", "froude", "looks", "machine", "moved", "order", "restart")
+LAWS |= {f"busy_{name}": (draw.busy(), LAWS[name][1]) for name in BUSY}
 
 # Else numbers that stand in source files near by are drawn now and then, and editing moves seeds.
 HypothesisProvider._maybe_draw_constant = lambda *_, **__: None

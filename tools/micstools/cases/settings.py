@@ -37,7 +37,7 @@ class Setting:
 
 def read(path: Path) -> str:
     """The text of a case file as the program takes it: UTF-8, else Latin-1, without a byte-order
-    mark; blanks that do not break are blanks, but in strings."""
+    mark."""
     data = path.read_bytes()
     if b"\0" in data:
         raise BadRun(f"{path}: is no text")
@@ -45,6 +45,11 @@ def read(path: Path) -> str:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
+    return plain(text)
+
+
+def plain(text: str) -> str:
+    """Lines that end as ours; blanks that do not break are blanks, but in strings."""
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     return _STRINGS.sub(lambda found: " " if found[0] == "\xa0" else found[0], text)
 

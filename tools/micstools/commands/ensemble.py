@@ -96,7 +96,8 @@ class _Live:
         self.table[member], self.left = end, self.left - 1
         ensemble_table.write(self.plan, self.table)
         if not end.counts:
-            self._say(f"run {member.number:04d} {end.outcome}: {end.reason or end.code}")
+            text = f"run {member.number:04d} {end.outcome}: {end.reason or end.code}"
+            print(f"\r{text}\033[K" if self.terminal else text)
         passed = time.monotonic() - self.start
         left = passed / (self.todo - self.left) * self.left
         done = sum(known.counts for known in self.table.values())
@@ -104,9 +105,6 @@ class _Live:
         text += f" | {ensemble_table.sentence(self.table)} | {left / 60:.1f} min left"
         print(f"\r{text}\033[K" if self.terminal else text, end="" if self.terminal else "\n")
         sys.stdout.flush()
-
-    def _say(self, text: str) -> None:
-        print(f"\r{text}\033[K" if self.terminal else text)
 
     def close(self) -> None:
         """Leave the last line standing."""

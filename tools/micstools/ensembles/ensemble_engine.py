@@ -93,6 +93,7 @@ def _workers(engine: Engine, jobs: int, folder: Path) -> Iterator[Executor]:
             try:
                 yield workers
             except KeyboardInterrupt:
+                signal.signal(signal.SIGTERM, signal.SIG_IGN)  # Ctrl-C hastens what it does
                 stop()
                 raise
         return

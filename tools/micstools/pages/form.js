@@ -50,8 +50,8 @@ class Form {
 
   // One group of the case.
   instance({ group, n, values }, of) {
-    const wrong = words => make('p', { class: 'wrong', 'data-of': `${group}.${n}` }, words);
-    if (!values) return wrong('This group cannot be read: mend it in the text.');
+    const wrong = () => make('p', { class: 'wrong', 'data-of': `${group}.${n}` });
+    if (!values) return make('div', {}, 'This group cannot be read: mend it in the text.', wrong());
     const first = ([name]) => group !== FIRST[0] || name !== FIRST[1] || n > 0, needed = this.needed(group);
     const names = Object.entries(this.groups[group].properties).filter(first).map(([name]) => name);
     const shown = names.filter(name => needed.includes(name) || name in values);
@@ -62,7 +62,7 @@ class Form {
     const summary = make('summary', {}, make('b', {}, `&${group}${several ? ` ${n + 1}` : ''}`), ' ', make('span', {}, brief),
       make('span', { class: 'tools' }, several ? button('copy', 'copy') : null, button('remove', 'remove')));
     const more = make('details', { class: 'more' }, make('summary', {}, `${others.length} more`), ...fields(others));
-    return make('details', { class: 'instance', open: of <= OPEN ? '' : null }, summary, wrong(''), ...fields(shown),
+    return make('details', { class: 'instance', open: of <= OPEN ? '' : null }, summary, wrong(), ...fields(shown),
       others.length ? more : null);
   }
 

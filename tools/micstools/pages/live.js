@@ -21,7 +21,7 @@ const tell = words => { document.getElementById('told').textContent = words; };
 function putParts(parts) {
   for (const [name, text] of Object.entries(parts)) {
     const place = document.querySelector(`[data-live=${name}]`);
-    if (!place || place.was === text) continue;
+    if (!place || place.was === text || place.matches(':active')) continue; // a button is being pressed
     place.was = place.innerHTML = text;
   }
 }
@@ -41,12 +41,15 @@ class Live {
   }
 
   async look() {
+    this.wanted = this.busy; // another look after this one
     if (document.hidden || this.busy) return;
     this.busy = true;
     const began = performance.now();
     let often = false;
     try {
-      const { parts, running, key } = await ask('live');
+      const { parts, running, key, of } = await ask('live');
+      if (this.of && this.of !== of) location.reload(); // another run is watched from here now
+      this.of = of;
       often = running;
       putParts(parts);
       document.querySelectorAll('main > .row [data-stop], [data-ask]').forEach(b => { b.disabled = !running; });
@@ -60,21 +63,22 @@ class Live {
       tell(`no answer: ${problem.message}`);
     }
     this.busy = false;
-    this.soon(Math.max(often ? OFTEN : SELDOM, PATIENCE * (performance.now() - began)));
+    this.soon(this.wanted ? 0 : Math.max(often ? OFTEN : SELDOM, PATIENCE * (performance.now() - began)));
   }
 
   // The motion so far; who stands at its end stays there.
   async showScene(key) {
-    const { player } = this, scene = player && await ask(this.chosen ? `scene?run=${this.chosen}` : 'scene');
+    const { player, chosen } = this, scene = player && await ask(chosen ? `scene?run=${chosen}` : 'scene');
+    if (chosen !== this.chosen) return;
     this.key = key;
     if (!scene) return;
     player.root.hidden = !scene.bodies;
     if (!scene.bodies) return;
-    const stage = player.stage, same = stage.scene && this.loaded === this.chosen;
+    const stage = player.stage, same = stage.scene && this.loaded === chosen;
     const at = same ? stage.time : null, atEnd = !same || at >= stage.times[stage.times.length - 1];
     const playing = player.playing;
     player.load(scene, same);
-    this.loaded = this.chosen;
+    this.loaded = chosen;
     player.show(atEnd ? stage.times[stage.times.length - 1] : at);
     if (playing && !atEnd) player.play();
   }

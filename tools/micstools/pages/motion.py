@@ -252,7 +252,8 @@ def _surface(run: Run, seen: Columns) -> dict[str, Any]:
     every = max(1, int(np.ceil(run.field_times.size * i.size * j.size / SURFACE_BYTES)))
     times = run.field_times[::every]
     for t in set(times.tolist()) - set(seen):
-        seen[t] = _columns(run, t)
+        # a block counts as the water around it
+        seen[t] = (run.fields_at(t).liquid * np.diff(grid.z)[:, None, None]).sum(axis=0)
     height = np.array([seen[t][np.ix_(j, i)] for t in times.tolist()])
     low, high = float(height.min()), float(height.max())
     span = high - low or 1.0
@@ -274,10 +275,3 @@ def _to_ends(centres: Array, faces: Array) -> Array:
     if len(found) > 1:
         found[0], found[-1] = faces[0], faces[-1]
     return found
-
-
-def _columns(run: Run, t: float) -> Array:
-    """Height (ny, nx) [m] above the floor at which the water of each column would stand; a block
-    counts as the water around it."""
-    height = np.diff(run.grid.z)[:, None, None]
-    return np.asarray((run.fields_at(t).liquid * height).sum(axis=0))

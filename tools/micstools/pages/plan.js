@@ -136,7 +136,7 @@ function chooseLine(text, line) {
 // Where a line of a text begins and ends.
 function ends(text, line) {
   const lines = text.split('\n'), from = lines.slice(0, line - 1).reduce((sum, words) => sum + words.length + 1, 0);
-  return [from, from + lines[line - 1].length];
+  return [from, from + (lines[line - 1] || '').length];
 }
 
 // A player of a set-up, with the buttons of its page.

@@ -39,7 +39,7 @@ class Player {
     });
   }
 
-  // `keep`: the view, the pace and who is followed stay.
+  // `keep`: the view, who is followed and the pace, if it is offered again, stay.
   load(scene, keep = false) {
     const pace = this.pace.value, followed = this.follow.value;
     this.pause();
@@ -90,15 +90,15 @@ class Player {
     this.button.textContent = 'Pause';
     let last = performance.now();
     const step = now => {
-      if (!this.playing) return;
       this.show(this.stage.time + (now - last) / 1000 * +this.pace.value);
       last = now;
-      if (this.stage.time >= end) this.pause(); else requestAnimationFrame(step);
+      if (this.stage.time >= end) this.pause(); else this.frame = requestAnimationFrame(step);
     };
-    requestAnimationFrame(step);
+    this.frame = requestAnimationFrame(step);
   }
 
   pause() {
+    cancelAnimationFrame(this.frame);
     this.playing = false;
     this.button.textContent = 'Play';
   }

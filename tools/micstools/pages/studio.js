@@ -9,7 +9,8 @@ class Studio {
     this.player = player;
     this.form = document.getElementById('form');
     this.text = document.getElementById('text');
-    this.checking = this.again = this.wrong = false;
+    this.checking = this.again = false;
+    this.wrong = ''; // why the last change was not made
     this.pending = new Set(); // fields whose change has not been sent yet
     this.form.addEventListener('input', event => this.later(event.target));
     this.form.addEventListener('change', event => this.later(event.target, 0));
@@ -20,9 +21,10 @@ class Studio {
     document.addEventListener('click', event => this.click(event));
     if (player) player.stage.grab = new Grab(player.stage, (body, by) => {
       this.flush();
-      this.edit({ op: 'move', body, by });
+      if (this.checking) tell('not moved: wait for the check');
+      else this.edit({ op: 'move', body, by });
     });
-    this.start();
+    this.inLine(() => this.start());
   }
 
   async start() {
@@ -41,6 +43,7 @@ class Studio {
 
   later(field, wait = TYPING) {
     this.pending.add(field);
+    field.made = this.groups;
     document.getElementById('save').disabled = false;
     clearTimeout(field.waiting);
     field.waiting = setTimeout(() => this.send(field), wait);
@@ -78,19 +81,20 @@ class Studio {
     return this.line = (this.line || Promise.resolve()).then(work).catch(problem => tell(problem.message));
   }
 
-  // A change of a field counts for the groups that it was made for.
+  // A change of a field counts for the groups and the text that it was made for.
   edit(order, field) {
-    const made = this.groups;
+    const { given } = this;
     return this.inLine(async () => {
+      if (field && given !== this.given) return;
       try {
         const was = this.groups;
-        if (order.op === 'set' && made !== was) throw new Error(`not changed: ${order.variable}, for the groups are others now`);
+        if (order.op === 'set' && field.made !== was) throw new Error(`not changed: ${order.variable}, for the groups are others now`);
         const state = await this.post('edit', order);
         this.take(state);
         if (order.op !== 'set' && order.op !== 'move' || was !== this.groups) this.rebuild();
         tell('');
       } catch (problem) {
-        this.wrong = true;
+        this.wrong = problem.message;
         if (field && field.isConnected && !problem.theirs) { // Save and Run try again
           field.sent = undefined;
           this.pending.add(field);
@@ -113,8 +117,10 @@ class Studio {
         document.activeElement.blur();
         for (const field of this.pending) clearTimeout(field.waiting);
         this.pending.clear();
+        this.given = {}; // what is in line is of the text that was given up
         this.take(state);
         this.rebuild();
+        this.check();
         throw Object.assign(new Error('the text of the other window is shown'), { theirs: true });
       }
       this.number = state.number;
@@ -176,6 +182,7 @@ class Studio {
     if (!this.player) return;
     const keep = Boolean(this.player.stage.scene) && !this.fresh, time = keep ? this.player.stage.time : 0;
     this.fresh = false;
+    this.player.stage.grab.body = null; // of another scene
     this.player.load(said.scene, keep);
     this.player.show(time);
   }
@@ -199,7 +206,7 @@ class Studio {
       button.addEventListener('click', () => (field || place || this.text).scrollIntoView({ block: 'center' }) || (field && field.focus()));
       const words = document.createElement('span');
       words.textContent = text;
-      if (line || group) {
+      if (line || group && this.lineOf(group, variable)) {
         const there = document.createElement('button');
         Object.assign(there, { type: 'button', className: 'line', textContent: `line ${this.lineOf(group, variable, line)}` });
         there.addEventListener('click', () => this.goTo(this.lineOf(group, variable, line)));
@@ -216,7 +223,7 @@ class Studio {
     if (!button) return;
     const { add, copy, remove, n, show } = button.dataset;
     if (copy || remove) event.preventDefault(); // stands in a summary, which would close
-    this.wrong = false;
+    this.wrong = '';
     this.flush();
     if (add) await this.edit({ op: 'add', group: add });
     if (copy) await this.edit({ op: 'copy', group: copy, n: +n });
@@ -258,11 +265,11 @@ class Studio {
   async order(path) {
     await this.line;
     const [threads, runs, spread] = ['threads', 'runs', 'spread'].map(id => document.getElementById(id));
-    if (this.wrong || ![threads, runs, spread].every(field => field.checkValidity())) {
-      [threads, runs, spread].forEach(field => field.reportValidity());
-      return;
-    }
-    document.getElementById('many').close();
+    const used = { save: [], run: [threads], repeat: [threads, runs, spread] }[path];
+    const bad = used.find(field => !field.checkValidity()), { wrong } = this;
+    if (bad !== runs && bad !== spread) document.getElementById('many').close();
+    if (bad) return bad.reportValidity();
+    if (wrong) return tell(wrong);
     tell('…');
     await this.inLine(async () => {
       const { told, open } = await this.post(path, { threads: threads.value, runs: runs.value, spread: spread.value });

@@ -14,7 +14,7 @@ import numpy as np
 from micstools import files
 from micstools.cases import case_copy, settings
 from micstools.pages import plan_page, set_up
-from micstools.pages.set_up import Refused, Remark
+from micstools.pages.set_up import Refused
 from micstools.reading.reader import BadRun
 
 NEW = Path(__file__).with_name("new.nml").read_text()
@@ -102,7 +102,7 @@ class Draft:
             if self.text == before:
                 return
             if op != "undo":
-                self.before = [*self.before[-_STEPS:], before]
+                self.before = [*self.before[1 - _STEPS :], before]
             self.number += 1
             if op == "move":  # and no group came or went
                 self.seen = self.number
@@ -176,7 +176,7 @@ class Draft:
         self.text = settings.set_group(self.text, group, {"position": new}, n)
 
     def _write(self, order: dict[str, Any]) -> None:
-        text = str(order["text"]).replace("\r\n", "\n")
+        text = settings.plain(str(order["text"]))
         if "\0" in text:
             raise BadRun("this is no text")
         self.text = text
@@ -214,7 +214,8 @@ class Draft:
                 return {"problems": [], "warnings": len(found.warnings), "parts": parts,
                         "scene": plan_page.scene(found)}  # fmt: skip
         except Refused as refused:
-            return {"problems": [_remark(r) for r in refused.remarks], "warnings": 0}
+            said = [asdict(r) | {"short": _HEAD.sub("", r.text)} for r in refused.remarks]
+            return {"problems": said, "warnings": 0}
 
     def _keep_bodies(self, found: set_up.SetUp) -> None:
         """Which group each body comes from."""
@@ -267,7 +268,3 @@ def words_of(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(words_of(v) for v in value)
     return "" if value is None else str(value)
-
-
-def _remark(remark: Remark) -> dict[str, Any]:
-    return {**asdict(remark), "short": _HEAD.sub("", remark.text)}

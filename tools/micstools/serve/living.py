@@ -66,8 +66,8 @@ class State:
         return float(np.clip(self.time / self.end, 0, 1)) if self.end > 0 else 0.0
 
 
-def state(run: Run) -> State:
-    """How far a run is, and whether its program lives."""
+def state(run: Run, before: Holder | None = None) -> State:
+    """How far a run is, and whether its program lives, or did `before` the run was read."""
     time, wall = run.series.time, run.series.wall_time
     code = int(run.provenance.get("exit_status", _RUNNING))
     end = float(run.value("run", "t_end"))
@@ -77,7 +77,7 @@ def state(run: Run) -> State:
         if code == 0 and now < end - 1e-9:
             words = "settled"
         return State(words, False, now, end, float("nan"), passed, code)
-    who = holder(run.folder / "run.lock")
+    who = before or holder(run.folder / "run.lock")
     words = "running" if who else "was killed"
     if who and not who.here:
         words += f" on {who.host}"
@@ -111,7 +111,7 @@ def stop_at_once(folder: Path) -> str:
 
 def stop_ensemble(folder: Path, running: list[Path]) -> str:
     """End an ensemble: it tells its runs, which write their restart files. Where it is on another
-    machine, the results that are `running` are asked one by one."""
+    machine, or nobody holds the lock, the results that are `running` are asked one by one."""
     who = holder(folder / "ensemble.lock")
     if who and who.here:
         _signal(who, folder / "ensemble.lock", signal.SIGTERM)

@@ -141,7 +141,7 @@ class Site:
             words = "open the address that mics-tools printed; Enter in its window prints another"
             return web.Response(status=403, text=words)
         if request.method != "GET" and not _same(request.headers.get(TOKEN, ""), self.token):
-            return web.Response(status=403, text="no token")
+            return web.Response(status=403, text="this page is of an earlier call: load it anew")
         return None
 
     def _lets_in(self, given: str) -> bool:
@@ -174,7 +174,7 @@ async def order_of(request: web.Request) -> dict[str, Any]:
 
 
 def json_answer(content: Any, status: int = 200) -> web.Response:
-    """Numbers and texts for a script; what is not finite is none."""
+    """Finite numbers and texts for a script."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     return web.Response(text=text, content_type="application/json", status=status)
 
@@ -228,12 +228,15 @@ async def _serve(site: Site, port: int, browser: bool) -> None:
 
 def _print_another(site: Site) -> None:
     """After Enter, an address for another browser, or for one that has lost its cookie."""
-    if os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
-        return  # it was typed for a shell
-    if sys.stdin.readline():
-        print(site.address(), flush=True)
-    else:  # the terminal has gone
-        asyncio.get_running_loop().remove_reader(sys.stdin)
+    loop = asyncio.get_running_loop()
+    loop.remove_reader(sys.stdin)
+    with contextlib.suppress(OSError):  # the terminal has gone
+        ours = os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()  # else it was typed for a shell
+        if ours and not sys.stdin.readline():
+            return
+        if ours:
+            print(site.address(), flush=True)
+        loop.call_later(0 if ours else 1, loop.add_reader, sys.stdin, _print_another, site)
 
 
 async def _open(site: Site) -> None:

@@ -31,6 +31,7 @@ class Begun(Watch):
     """Watches what was begun here; what the program says goes to `log`."""
 
     process: subprocess.Popen[bytes] | None = None
+    older: object = None  # when the results began that lay there before
 
     @property
     def goes_on(self) -> bool:
@@ -38,10 +39,11 @@ class Begun(Watch):
         alive = self.process is not None and self.process.poll() is None
         return alive or self.watched.goes_on
 
-    def begin(self, watched: Watched | Ensemble, words: list[str]) -> None:
+    def begin(self, watched: Watched | Ensemble, words: list[str], older: object = None) -> None:
         """Start a program that writes to what is watched from now on. Its session is its own:
         Ctrl-C ends the page, not the run."""
-        self.watched, self.log = watched, tempfile.TemporaryFile("w+")  # noqa: SIM115
+        self.watched, self.older = watched, older
+        self.log = tempfile.TemporaryFile()  # noqa: SIM115
         self.process = subprocess.Popen(
             words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.log,
             env={**program.ENVIRONMENT, **os.environ}, start_new_session=True)  # fmt: skip
@@ -51,13 +53,24 @@ class Begun(Watch):
         goes_on, found = self.goes_on, super().look()
         if self.process is None:
             return found
-        self.log.seek(0)
-        said = self.log.read()[-4000:].strip()
+        watched = self.watched
+        if isinstance(watched, Watched) and self.older and watched.began == self.older:
+            waits = watch_page.waiting(watched.folder, "Waiting for the run to begin.")
+            found |= {"parts": waits, "key": "", "running": False}
+        size = os.fstat(self.log.fileno()).st_size  # its place is that of the program, too
+        said = os.pread(self.log.fileno(), 4000, max(0, size - 4000)).decode(errors="replace")
+        said = said.strip()
         found["parts"]["log"] = tag("pre", said) if said else markup()
         if not found["key"] and not goes_on:
             code = self.process.returncode
             found["parts"]["state"] = markup(f"The program ended with code {code}.")
         return found | {"running": found["running"] or goes_on}
+
+    async def _stop(self, request: web.Request) -> web.Response:
+        if self.process and self.process.poll() is None and not self.watched.goes_on:
+            self.process.terminate()
+            return json_answer({"told": "asked to stop before it begins"})
+        return await super()._stop(request)
 
 
 class Studio:
@@ -114,7 +127,7 @@ class Studio:
         """Run the case, while the draft is locked: one at a time."""
         self.threads = int(order.get("threads") or _CORES)
         self._keep()
-        self._start()
+        self._start(Watched(self._folder()))
         return {"told": "the run begins", "open": "/watch"}
 
     def _begin_repeats(self, order: dict[str, Any]) -> dict[str, Any]:
@@ -138,10 +151,11 @@ class Studio:
         with self.draft.lock:
             self._require_rest()
             watched = self.watch.watched
-            run = watched.look() if isinstance(watched, Watched) else None
+            with watched.lock:
+                run = watched.look() if isinstance(watched, Watched) else None
             if run is None or not run.restart_files:
                 raise BadRun("there is no restart file to go on from")
-            self._start("--restart", str(run.folder / run.restart_files[-1]))
+            self._start(Watched(run.folder), "--restart", str(run.folder / run.restart_files[-1]))
         return {"told": "the run goes on"}
 
     def _repeats(self) -> Path:
@@ -160,10 +174,11 @@ class Studio:
             if self.watch.goes_on or one.goes_on:
                 raise BadRun(f"a run goes on in {one.folder}: stop it first, or wait")
 
-    def _start(self, *more: str) -> None:
+    def _start(self, watched: Watched, *more: str) -> None:
         """The program on the case as it is saved."""
         words = [str(self.draft.program), "--quiet", "--threads", str(self.threads), *more]
-        self.watch.begin(Watched(self._folder()), [*words, str(self.draft.case)])
+        older = watched.began if not more and watched.look() else None
+        self.watch.begin(watched, [*words, str(self.draft.case)], older)
 
     async def _watch(self, _: web.Request) -> web.Response:
         if not await apart(self._known):

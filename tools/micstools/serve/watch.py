@@ -1,5 +1,6 @@
 """Watches a run or an ensemble: reads its files at each look, changes nothing but by a button."""
 
+import asyncio
 import re
 import subprocess
 import sys
@@ -40,6 +41,7 @@ class Watched:
         self.lock = threading.Lock()
         self.run: Run | None = None
         self.trouble = ""  # with its file
+        self.who: living.Holder | None = None  # wrote to it before the last look
         self.began: object = None
         self.still: dict[str, Any] = {}  # of the scene
         self.columns: motion.Columns = {}
@@ -51,6 +53,7 @@ class Watched:
 
     def look(self) -> Run | None:
         """The run as it is now; none before it has a row. A run that began anew is another one."""
+        self.who = living.holder(self.folder / "run.lock")
         try:
             self.run = self.run or Run(self.folder, most=MOST)
             self.run.refresh()
@@ -69,9 +72,15 @@ class Watched:
             if run is None:
                 parts = watch_page.waiting(self.folder, self.trouble)
                 return {"parts": parts, "running": False, "key": ""}
-            found = living.state(run)
+            found = living.state(run, self.who)
             key = f"{self.began} {run.series.time[-1]}"
             return {"parts": watch_page.run_parts(run, found), "running": found.running, "key": key}
+
+    def state(self) -> living.State | None:
+        """How far it is; none before it has a row."""
+        with self.lock:
+            run = self.look()
+            return living.state(run, self.who) if run else None
 
     def scene(self) -> dict[str, Any]:
         """The motion so far."""
@@ -130,14 +139,14 @@ class Ensemble:
         found: dict[Member, ensemble.State] = {}
         running: dict[int, living.State] = {}
         for member in self.members():
+            alive = member.number not in self.done and living.holder(member.result / "run.lock")
+            far = self.of(member).state() if alive else None
             end = self.done.get(member.number) or ensemble.state(member)
             if end.counts:
                 self.done[member.number] = end
-            elif living.holder(member.result / "run.lock"):
-                run = self.of(member).look()
-                if run:
-                    running[member.number] = living.state(run)
-                    end = ensemble.State("running")
+            elif far and far.running:
+                running[member.number] = far
+                end = ensemble.State("running")
             found[member] = end
         return found, running
 
@@ -192,7 +201,7 @@ class Watch:
 
     def __init__(self, watched: Watched | Ensemble) -> None:
         """Of what is watched."""
-        self.watched = watched
+        self.watched, self.using = watched, asyncio.Lock()
 
     @property
     def report(self) -> Path:
@@ -209,8 +218,8 @@ class Watch:
         site.get("/report", self._report)
 
     def look(self) -> dict[str, Any]:
-        """What the page shows now."""
-        return self.watched.parts()
+        """What the page shows now, and of which folder."""
+        return self.watched.parts() | {"of": str(self.watched.folder)}
 
     async def _parts(self, _: web.Request) -> web.Response:
         return json_answer(await apart(self.look))
@@ -234,7 +243,10 @@ class Watch:
 
     async def _use(self, request: web.Request) -> web.Response:
         name, *more = TOOLS[request.path]
-        told = await apart(tool, name, str(self.watched.folder), *more)
+        if self.using.locked():
+            raise BadRun("one file is being made: wait for it")
+        async with self.using:
+            told = await apart(tool, name, str(self.watched.folder), *more)
         opened = {"open": "/report"} if request.path == "/report" else {}
         return json_answer({"told": told, **opened})
 
@@ -247,7 +259,8 @@ class Watch:
 def site_of(folder: Path) -> Site:
     """The site of a run or an ensemble."""
     site = Site()
-    watched = Ensemble(folder) if pile_ensemble.is_ensemble(folder) else Watched(folder)
+    many = (folder / "ensemble.lock").exists() or pile_ensemble.is_ensemble(folder)
+    watched = Ensemble(folder) if many else Watched(folder)
     Watch(watched).add_to(site)
 
     async def first(_: web.Request) -> web.Response:

@@ -102,8 +102,8 @@ def _facts(run: Run, found: State) -> Markup:
 
 
 def _speeds(run: Run) -> Array:
-    """Mean speed of each block since the last row but one [m/s]; velocities of resting blocks have
-    a noise of some mm/s."""
+    """Mean speed of each block since the row read before [m/s]; velocities of resting blocks have a
+    noise of some mm/s."""
     b = run.bodies
     if b.time.size < 2:
         return np.asarray(np.linalg.norm(b.velocity[-1], axis=1))

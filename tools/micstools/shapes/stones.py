@@ -30,7 +30,7 @@ def lay(found: HeightMap, d50: float, seed: int) -> HeightMap:
     at = np.stack([column, row], axis=1) + 0.5 + random.uniform(-_JITTER, _JITTER, (row.size, 2))
     middle = at * size / n
     axes = d50 / 2 * random.lognormal(0, _GRADING, row.size)[:, None] * _AXES
-    turn = rotation_matrix(_attitudes(random, row.size))
+    turn = rotation_matrix(random.normal(size=(row.size, 4)))  # any attitude alike
     form = np.einsum("nik,nk,njk->nij", turn, axes**-2.0, turn)
     z = bed.z.copy()
     for place, q, reach in zip(middle, form, axes.max(axis=1), strict=True):
@@ -38,12 +38,6 @@ def lay(found: HeightMap, d50: float, seed: int) -> HeightMap:
     z = np.round(z, round(3 - np.log10(d50)))
     said = f"{row.size} stones of D50 = {d50:g} m, which raise it by {(z - bed.z).mean():.3g} m"
     return replace(bed, z=z, remarks=(*found.remarks, said))
-
-
-def _attitudes(random: np.random.Generator, n: int) -> Array:
-    """Quaternions (n, 4), any attitude alike."""
-    found = random.normal(size=(n, 4))
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _raise(z: Array, bed: HeightMap, place: Array, q: Array, reach: float) -> None:
