@@ -10,7 +10,7 @@
 module mass_average_m
   use kinds_m, only: wp, i8
   use vectors_m, only: cross
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t, n_halo, unit_step
   use scratch_m, only: take, give
   use stage_m, only: stage_t
@@ -39,7 +39,7 @@ module mass_average_m
   private
   public :: mass_average_t, mass_average_init, density_of_mixture
 
-  real(wp), parameter :: held_density = 1.0e6_wp   !! inertia of a fixed body in the mixture [kg/m3]
+  real(wp), parameter :: held_ratio = 1.0e3_wp   !! density of a fixed body over the liquid's [-]
 
   type, extends(coupling_t) :: mass_average_t
     integer :: passes = 1
@@ -99,7 +99,7 @@ contains
     end associate
     if (.not. self%implicit_momentum) return
     call find_surface_force(s, self)
-    call density_of_mixture(s%grid, s%solid, self%bodies, s%flow%rho, self%rho)
+    call density_of_mixture(s%grid, self%fluid, s%solid, self%bodies, s%flow%rho, self%rho)
     call keep_acceleration(s, self%whole%aperture, self%rho, self)
     call give(s%scratch, self%tension%force)
   end subroutine begin
@@ -115,8 +115,8 @@ contains
       call displaced_force(s%grid, self%fluid, s%solid, bodies, s%flow%c, &
                            self%force(:, :, by_displaced))
       call move_by_forces(s%dt, self)
-      call density_of_mixture(s%grid, s%solid, bodies, s%flow%rho, self%rho)
-      call average_cells(s%grid, s%solid, bodies, s%flow, self%rho)
+      call density_of_mixture(s%grid, self%fluid, s%solid, bodies, s%flow%rho, self%rho)
+      call average_cells(s%grid, self%fluid, s%solid, bodies, s%flow, self%rho)
     end associate
     self%u_before = s%flow%u
   end subroutine average_momentum
@@ -195,7 +195,7 @@ contains
     associate (grid => s%grid, flow => s%flow, a => self%acceleration)
       do pass = 1, self%passes
         if (pass > 1) then
-          call average_cells(grid, s%solid, self%bodies, flow, self%rho)
+          call average_cells(grid, self%fluid, s%solid, self%bodies, flow, self%rho)
           self%u_before = flow%u
           a%cell = 0.0_wp
           a%face = 0.0_wp
@@ -213,8 +213,9 @@ contains
   end subroutine project
 
   !> Density of fluid and solids in each cell: rho = (1 - alpha) rho_fl + sum alpha_k rho_k [kg/m3].
-  subroutine density_of_mixture(grid, solid, bodies, rho, mixture)
+  subroutine density_of_mixture(grid, fluid, solid, bodies, rho, mixture)
     type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -226,7 +227,7 @@ contains
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
           mixture(i(1), i(2), i(3)) = mixture(i(1), i(2), i(3)) &
-            + solid%cell_alpha(m)*body_density(bodies, b)
+            + solid%cell_alpha(m)*body_density(fluid, bodies, b)
         end associate
       end do
     end do
@@ -234,19 +235,21 @@ contains
   end subroutine density_of_mixture
 
   !> Density with which a body enters the mixture [kg/m3].
-  pure function body_density(bodies, b) result(rho)
+  pure function body_density(fluid, bodies, b) result(rho)
+    type(fluid_t), intent(in) :: fluid
     type(rigid_motion_t), intent(in) :: bodies
     integer, intent(in) :: b
     real(wp) :: rho
 
-    rho = merge(bodies%mass(b)/bodies%volume(b), held_density, bodies%free(b))
+    rho = merge(bodies%mass(b)/bodies%volume(b), held_ratio*fluid%liquid_density, bodies%free(b))
   end function body_density
 
   !> Mass average of the fluid velocity and the rigid velocity in every cell a body reaches:
   !! u = [(1 - alpha) rho_fl u + sum alpha_k rho_k (U_k + Omega_k x r)]/rho, r to the solid
   !! centroid.
-  subroutine average_cells(grid, solid, bodies, flow, mixture)
+  subroutine average_cells(grid, fluid, solid, bodies, flow, mixture)
     type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(flow_t), intent(inout) :: flow
@@ -263,8 +266,8 @@ contains
         arm = nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b))
         associate (i => solid%cell(:, m))
           flow%u(i(1), i(2), i(3), :) = flow%u(i(1), i(2), i(3), :) + solid%cell_alpha(m) &
-            *body_density(bodies, b)/mixture(i(1), i(2), i(3))*wall_velocity(bodies%motion(:, b), &
-                arm)
+            *body_density(fluid, bodies, b)/mixture(i(1), i(2), i(3)) &
+            *wall_velocity(bodies%motion(:, b), arm)
         end associate
       end do
     end do
@@ -341,7 +344,7 @@ contains
     associate (unused => blocks)
     end associate
     associate (grid => s%grid, solid => s%solid, flow => s%flow, system => self%pressure%system)
-      call average_cells(grid, solid, self%bodies, flow, self%rho)
+      call average_cells(grid, self%fluid, solid, self%bodies, flow, self%rho)
       do b = 1, self%bodies%n
         do m = solid%body_face(b), solid%body_face(b + 1) - 1
           d = solid%face(4, m)
@@ -350,7 +353,7 @@ contains
           if (any((i < 1 .or. low < 1 .or. i > grid%n) .and. .not. grid%periodic)) cycle
           rigid = wall_velocity(self%bodies%motion(:, b), &
                                 nearest_arm(grid, solid%face_centroid(:, m), self%bodies%x(:, b)))
-          share = solid%face_beta(m)*body_density(self%bodies, b)   ! of the mass at the face
+          share = solid%face_beta(m)*body_density(self%fluid, self%bodies, b)   ! of the mass
           share = share/(share + (1.0_wp - solid%face_beta(m))*face_mean( &
             flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
           flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &

@@ -18,9 +18,7 @@ def froude(world: World, folder: Path) -> None:
 
 
 def units(world: World, folder: Path) -> None:
-    """Mass times 64, time times 2 or length times 4, each alone; a held body in the mixture of
-    `coupling = 'mics'` has a density in kg/m3, so that is left out."""
-    world = world.changed("numerics", coupling="monolithic")
+    """Mass times 64, time times 2 or length times 4, each alone."""
     same_in_other_units(world, folder / "mass", (1.0, 1.0, 64.0))
     same_in_other_units(world, folder / "time", (1.0, 2.0, 1.0))
     same_in_other_units(world, folder / "length", (4.0, 1.0, 1.0))

@@ -20,13 +20,15 @@ contains
                //'size=.02/ &body shape="h" position=.0611,.0517,.0564/ '//slip, block)
     allocate (mixture, source=block%flow%rho)
     fluid = block%case%fluid%liquid_density*(product(length) - block%bodies%volume(1))
-    call density_of_mixture(block%grid, block%solid, block%bodies, block%flow%rho, mixture)
+    call density_of_mixture(block%grid, block%case%fluid, block%solid, block%bodies, &
+      block%flow%rho, mixture)
     solid = block%bodies%mass(1)
     call check('fluid and a free body', mass(), fluid + solid, 1.0e-12_wp*fluid)
     call check('no lighter', &
                minval(mixture) >= block%case%fluid%liquid_density*(1.0_wp - 1.0e-15_wp))
     block%bodies%free = .false.
-    call density_of_mixture(block%grid, block%solid, block%bodies, block%flow%rho, mixture)
+    call density_of_mixture(block%grid, block%case%fluid, block%solid, block%bodies, &
+      block%flow%rho, mixture)
     call check('a held body is as good as unmovable', mass() - fluid > 100.0_wp*solid)
   end subroutine test_mass_average
 
