@@ -91,8 +91,8 @@ contains
     if (.not. sim%wet) return
     call energy_init(case, sim%grid, sim%blocks, sim%energy)
     call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
-    if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
-      sim%grid%h, sim%blocks, sim%contacts%lubrication)
+    if (case%contact%lubrication) call lubrication_init(case, sim%grid%h, sim%blocks, &
+      sim%contacts%lubrication)
     select case (case%numerics%solid_fraction)
     case ('exact'); subcells = 0
     case ('subcell'); subcells = case%numerics%subcells

@@ -33,7 +33,7 @@ contains
     t_end = blocks%time + dt
     call begin(walls, gravity, dt, contacts, blocks)
     call contacts%detect(walls, blocks)
-    if (contacts%sleep%active) call wake_or_sleep(walls, gravity, contacts, blocks)
+    if (allocated(contacts%sleep%reach)) call wake_or_sleep(walls, gravity, contacts, blocks)
     if (all_still(blocks)) then
       contacts%loads%impulse(:, 1:) = dt*contacts%sleep%load
       contacts%loads%twist(:, 1:) = dt*contacts%sleep%load_torque
@@ -80,7 +80,7 @@ contains
     contacts%loads%peak = 0.0_wp
     contacts%met%n = 0
     call update_counterparts(walls, gravity, blocks, contacts%counterparts)
-    if (.not. contacts%sleep%active) return
+    if (.not. allocated(contacts%sleep%reach)) return
     contacts%sleep%x = blocks%x
     contacts%sleep%q = blocks%q
     call update_stillness(blocks, changed)
@@ -101,7 +101,7 @@ contains
     end do
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
-    if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
+    if (allocated(contacts%sleep%reach)) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
     associate (peak => contacts%loads%peak)
       where (blocks%asleep) peak = max(peak, norms(blocks%contact_force))

@@ -88,7 +88,7 @@ contains
       h = step/real(n, wp)
       do
         call solve_step(walls, gravity, h, n, step, contacts, blocks)
-        if (.not. contacts%sleep%active) exit
+        if (.not. allocated(contacts%sleep%reach)) exit
         call hold_or_wake(gravity, contacts, blocks, woke)
         if (.not. woke) exit
         call restore_contacts(blocks, contacts)   ! what wakes takes part: once more
@@ -132,7 +132,8 @@ contains
     associate (s => contacts%surface)
       edge = contacts%smallest_edge
       longest = left
-      if (contacts%lubrication%active) longest = min(left, contacts%rows%contact_time/film_steps)
+      if (allocated(contacts%lubrication%radius)) longest = min(left, &
+        contacts%rows%contact_time/film_steps)
       if (most*longest > free_way*maxval(s%bounding_radius)) longest = min(longest, &
         max(contacts%rows%contact_time, free_way*maxval(s%bounding_radius)/most))
       call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
@@ -204,7 +205,7 @@ contains
       end associate
       contacts%film = 0.0_wp
       contacts%film(3, 1:) = blocks%sling
-      if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
+      if (allocated(contacts%lubrication%radius)) call lubricate(walls, blocks, step, 0.5_wp*step, &
         contacts%lubrication, contacts%film)
       call make_rows(h, contacts%points, contacts%counterparts, blocks, &
         contacts%displacements, rows)

@@ -6,6 +6,7 @@
 module lubrication_m
   use kinds_m, only: wp, pi
   use vectors_m, only: norm
+  use case_types_m, only: case_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_counterpart
@@ -16,34 +17,32 @@ module lubrication_m
 
   real(wp), parameter :: roughness = 1.0e-3_wp   !! thinnest film over the radius of the sphere [-]
   real(wp), parameter :: cutoff = 4.0_wp   !! of films: the grid misses 2 % of thicker ones [cells]
-  real(wp), parameter :: atmosphere = 101325.0_wp   !! [Pa]
 
   type :: lubrication_t
-    logical :: active = .false.
     real(wp) :: viscosity = 0.0_wp       !! of the liquid [Pa s]
+    real(wp) :: cavitation = 0.0_wp      !! suction at which it cavitates [Pa]
     real(wp) :: h(3) = 0.0_wp            !! edges of a cell [m]
-    real(wp), allocatable :: radius(:)   !! (n) of a sphere; 0: no sphere, no film [m]
+    real(wp), allocatable :: radius(:)   !! (n) of a sphere, else 0; not allocated: no films [m]
     type(pair_list_t), private :: near   !! spheres with a film between them
   end type lubrication_t
 
 contains
 
   !> Films of liquid around all spheres of a run.
-  subroutine lubrication_init(viscosity, h, blocks, lubrication)
-    real(wp), intent(in) :: viscosity   !! of the liquid [Pa s]
-    real(wp), intent(in) :: h(3)        !! edges of a cell [m]
+  subroutine lubrication_init(case, h, blocks, lubrication)
+    type(case_t), intent(in) :: case
+    real(wp), intent(in) :: h(3)   !! edges of a cell [m]
     type(blocks_t), intent(in) :: blocks
     type(lubrication_t), intent(out) :: lubrication
-    integer :: b
+    integer :: b, s
 
-    lubrication%active = .true.
-    lubrication%viscosity = viscosity
+    lubrication%viscosity = case%fluid%liquid_viscosity
+    lubrication%cavitation = case%contact%cavitation_pressure
     lubrication%h = h
     allocate (lubrication%radius(blocks%n), source=0.0_wp)
     do b = 1, blocks%n
-      associate (shape => blocks%shapes(blocks%shape(b)))
-        if (shape%kind == 'sphere') lubrication%radius(b) = shape%sphere_radius(1)
-      end associate
+      s = blocks%shape(b)
+      if (blocks%shapes(s)%kind == 'sphere') lubrication%radius(b) = blocks%shapes(s)%sphere_radius(1)
     end do
   end subroutine lubrication_init
 
@@ -122,11 +121,11 @@ contains
     if (gap >= cutoff*cell .or. .not. cell > 0.0_wp) return
     a = sqrt(2.0_wp)*cell
     half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*roughness*radius)
-    associate (mu => lubrication%viscosity)
+    associate (mu => lubrication%viscosity, p => lubrication%cavitation)
       resistance = (film_impulse(mu, radius, a, gap + half) &
         - film_impulse(mu, radius, a, gap - half))/(2*half)
       if (opening > 0.0_wp) resistance = min(resistance, &
-                                             film_pull(mu, radius, a, gap, opening)/opening)
+        film_pull(p, mu, radius, a, gap, opening)/opening)
     end associate
     f = -resistance*opening/(1.0_wp + 0.5_wp*resistance*inverse*dt)
   end function push
@@ -176,21 +175,20 @@ contains
   !> Largest force with which a film that opens can pull [N].
   !!
   !! The liquid bears no tension: where the suction \( 3\mu R v/s^2 \) in a film as thick as s
-  !! passes the pressure of the atmosphere, it cavitates. With s_0 the thickness where it just does,
+  !! passes the pressure p outside, it cavitates. With s_0 the thickness where it just does,
   !! \( F = 2\pi R [p (s_0 - h) + 3\mu R v/s_0] \) for h < s_0, the integral over the film; less
   !! what the grid resolves.
-  pure function film_pull(viscosity, radius, a, gap, opening) result(force)
-    real(wp), intent(in) :: viscosity        !! of the liquid [Pa s]
+  pure function film_pull(p, viscosity, radius, a, gap, opening) result(force)
+    real(wp), intent(in) :: p, viscosity     !! outside, of the liquid [Pa], [Pa s]
     real(wp), intent(in) :: radius, a, gap   !! [m]
     real(wp), intent(in) :: opening          !! rate at which the gap opens, > 0 [m/s]
     real(wp) :: force
     real(wp) :: h, s, less
 
     h = max(gap, roughness*radius)
-    s = max(h, sqrt(3*viscosity*radius*opening/atmosphere))
+    s = max(h, sqrt(3*viscosity*radius*opening/p))
     less = 6*pi*viscosity*radius**2/h - film_resistance(viscosity, radius, a, h)
-    force = 2*pi*radius*(atmosphere*(s - h) + 3*viscosity*radius*opening/s) - less*opening
-    force = max(0.0_wp, force)
+    force = max(0.0_wp, 2*pi*radius*(p*(s - h) + 3*viscosity*radius*opening/s) - less*opening)
   end function film_pull
 
   !> One over the mass of a body, 0 if it is held [1/kg].

@@ -78,7 +78,7 @@ contains
           if (.not. blocks%asleep(b)) cycle
           other = contacts%steady(1:3, b) + blocks%mass(b)*gravity
           if (balanced(wake_tolerance, loads%force(:, b), loads%torque(:, b), other, &
-                       contacts%steady(4:6, b), sleep%bounding_radius(b))) then
+                       contacts%steady(4:6, b), sleep%reach(b))) then
             loads%force(:, b) = -other
             loads%torque(:, b) = -contacts%steady(4:6, b)
           else
@@ -134,7 +134,7 @@ contains
         if (.not. (candidate(b) .and. supported(b))) cycle
         if (.not. balanced(rest_tolerance, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(1:3, b) + blocks%mass(b)*gravity, &
-                           contacts%steady(4:6, b), contacts%sleep%bounding_radius(b))) cycle
+                           contacts%steady(4:6, b), contacts%sleep%reach(b))) cycle
         ! should it wake before the step ends, contact has taken this
         loads%impulse(:, b) = loads%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
         loads%twist(:, b) = loads%twist(:, b) - blocks%l(:, b)

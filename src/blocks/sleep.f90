@@ -30,8 +30,7 @@ module sleep_m
   real(wp), parameter :: wake_tolerance = 2.0e-2_wp  !! imbalance that wakes, likewise
 
   type :: sleep_t
-    logical :: active = .false.
-    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
+    real(wp), allocatable :: reach(:)          !! (n) farthest point that touches, if any sleep [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
     type(displacements_t) :: frozen            !! contact points between what does not move
@@ -47,8 +46,7 @@ contains
     real(wp), intent(in) :: radius(:)           !! (n) [m]
     type(sleep_t), intent(out) :: sleep
 
-    sleep%active = active
-    sleep%bounding_radius = radius
+    if (active) sleep%reach = radius
     allocate (sleep%quiet(size(radius)), source=0.0_wp)
     allocate (sleep%load(3, size(radius)), sleep%load_torque(3, size(radius)), source=0.0_wp)
     call reserve_displacements(1, sleep%frozen)
@@ -123,9 +121,9 @@ contains
 
     do b = 1, blocks%n
       way = distance(blocks%x(:, b), sleep%x(:, b)) &
-        + 2.0_wp*norm(blocks%q(:, b) - sleep%q(:, b))*sleep%bounding_radius(b)
+        + 2.0_wp*norm(blocks%q(:, b) - sleep%q(:, b))*sleep%reach(b)
       if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
-          way <= slow*sqrt(norm(gravity)*sleep%bounding_radius(b))*dt) then
+          way <= slow*sqrt(norm(gravity)*sleep%reach(b))*dt) then
         sleep%quiet(b) = sleep%quiet(b) + dt
       else
         sleep%quiet(b) = 0.0_wp
@@ -142,7 +140,7 @@ contains
     logical :: yes
 
     yes = .not. (blocks%still(b) .or. hangs(b, blocks)) .and. sleep%quiet(b) > 0.0_wp
-    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%bounding_radius(b)
+    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%reach(b)
   end function may_sleep
 
   !> Whether contact forces balance weight and fluid within a tolerance.

@@ -84,6 +84,9 @@ contains
       //'disturbs them')
     call v%logical('lubrication', contact%lubrication, 'what the grid misses of the films of ' &
       //'liquid between spheres, and between spheres and walls, brakes them')
+    call v%real('cavitation_pressure', contact%cavitation_pressure, positive('Pa'), 'suction at ' &
+      //'which such a film cavitates: pressure of the air and of the water above', &
+      example='lubrication = .true.  cavitation_pressure = 2.0e5')
   end subroutine visit_contact
 
   !> `&bed`

@@ -359,7 +359,7 @@ contains
       case ('light fluid'); names = 'liquid_viscosity gas_density gas_viscosity surface_tension ' &
         //'initial_state'
       case ('fluid numerics'); if (len_trim(case%bed%file) == 0) names = 'solid_fraction subcells'
-      case ('dry contact', 'light contact'); names = 'lubrication'
+      case ('dry contact', 'light contact'); names = 'lubrication cavitation_pressure'
       case ('dry shape', 'coupled shape'); names = 'drag_coefficient'
       case default   ! all of it counts, or nothing
       end select

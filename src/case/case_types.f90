@@ -98,8 +98,8 @@ module case_types_m
     real(wp) :: bed_friction = 0.4_wp               !! of `&bed`, or `wall_friction`
     real(wp) :: substep_ratio = 0.05_wp             !! of the paper
     real(wp) :: courant_max = 0.1_wp                !! C_s of eq. (6)
-    logical :: sleep = .true.
-    logical :: lubrication = .false.
+    logical :: sleep = .true., lubrication = .false.
+    real(wp) :: cavitation_pressure = 101325.0_wp   !! of a film, one atmosphere [Pa]
   end type contact_input_t
 
   type, extends(group_t) :: shape_input_t

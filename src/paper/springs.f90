@@ -253,8 +253,8 @@ contains
     logical :: woke
     integer :: k
 
-    if (report%substeps == 0 .or. contacts%lubrication%active) call list_bodies(blocks%present, &
-      contacts%acting)
+    if (report%substeps == 0 .or. allocated(contacts%lubrication%radius)) call list_bodies( &
+      blocks%present, contacts%acting)
     associate (groups => contacts%response%groups, displacements => contacts%displacements, &
       loads => contacts%loads, support => contacts%support, counterparts => contacts%counterparts, &
       acting => contacts%acting%body(:contacts%acting%n))
@@ -275,10 +275,10 @@ contains
       loads%force(3, 1:) = blocks%sling
       call sum_groups(dt_b, contacts%points, contacts%response, counterparts, displacements, &
         loads, report)
-      if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
+      if (allocated(contacts%lubrication%radius)) call lubricate(walls, blocks, dt_b, 0.0_wp, &
         contacts%lubrication, loads%force)
       woke = .false.
-      if (contacts%sleep%active) call hold_or_wake(gravity, contacts, blocks, woke)
+      if (allocated(contacts%sleep%reach)) call hold_or_wake(gravity, contacts, blocks, woke)
       do k = 1, size(acting)
         associate (b => acting(k))
           loads%impulse(:, b) = loads%impulse(:, b) + dt_b*(loads%force(:, b) - support(1:3, b))

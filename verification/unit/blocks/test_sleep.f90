@@ -96,8 +96,8 @@ contains
       sleep%q = blocks%q
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
-        turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))
-      call store_quiet(gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
+        turn*way/sleep%reach(2)), blocks%q(:, 2))
+      call store_quiet(gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
     end associate
   end subroutine creep
 
