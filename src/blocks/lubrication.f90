@@ -34,15 +34,16 @@ contains
     real(wp), intent(in) :: h(3)   !! edges of a cell [m]
     type(blocks_t), intent(in) :: blocks
     type(lubrication_t), intent(out) :: lubrication
-    integer :: b, s
+    integer :: b
 
     lubrication%viscosity = case%fluid%liquid_viscosity
     lubrication%cavitation = case%contact%cavitation_pressure
     lubrication%h = h
     allocate (lubrication%radius(blocks%n), source=0.0_wp)
     do b = 1, blocks%n
-      s = blocks%shape(b)
-      if (blocks%shapes(s)%kind == 'sphere') lubrication%radius(b) = blocks%shapes(s)%sphere_radius(1)
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        if (shape%kind == 'sphere') lubrication%radius(b) = shape%sphere_radius(1)
+      end associate
     end do
   end subroutine lubrication_init
 
@@ -182,8 +183,7 @@ contains
     real(wp), intent(in) :: p, viscosity     !! outside, of the liquid [Pa], [Pa s]
     real(wp), intent(in) :: radius, a, gap   !! [m]
     real(wp), intent(in) :: opening          !! rate at which the gap opens, > 0 [m/s]
-    real(wp) :: force
-    real(wp) :: h, s, less
+    real(wp) :: force, h, s, less
 
     h = max(gap, roughness*radius)
     s = max(h, sqrt(3*viscosity*radius*opening/p))
