@@ -165,6 +165,7 @@ contains
       call warnings%report(error_unit, 'mics: warning: ')
       return
     end if
+    if (len(options%output) > 0) case%run%output = options%output
     if (is_root()) call print_plan(case, shapes, bed)
     call find_case_warnings(case, shapes, bed, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'

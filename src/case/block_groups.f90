@@ -84,6 +84,7 @@ contains
       //'disturbs them')
     call v%logical('lubrication', contact%lubrication, 'what the grid misses of the films of ' &
       //'liquid between spheres, and between spheres and walls, brakes them')
+    if (.not. contact%lubrication) call v%pass_over('cavitation_pressure', 'lubrication = .false.')
     call v%real('cavitation_pressure', contact%cavitation_pressure, positive('Pa'), 'suction at ' &
       //'which such a film cavitates: pressure of the air and of the water above', &
       example='lubrication = .true.  cavitation_pressure = 2.0e5')
@@ -180,8 +181,8 @@ contains
     call v%option('spheres', shape%spheres, 'centroid inscribed dense', 'contact spheres of the ' &
       //'shape: one about the centroid of each tetrahedron as in the paper, the largest in ' &
       //'each tetrahedron, or close together along the surface', example='''dense''')
-    call v%without_meaning(shape%spheres /= 'dense' .and. v%good('spheres'), 'sphere_spacing', &
-      'spheres = '//quoted_text(trim(shape%spheres)), 'only ''dense'' has it')
+    if (shape%spheres /= 'dense' .and. v%good('spheres')) call v%pass_over('sphere_spacing', &
+      'spheres = '//quoted_text(trim(shape%spheres)))
     call v%real('sphere_spacing', shape%sphere_spacing, &
       not_negative('m', zero='0 means a tenth of the smallest edge'), &
       'distance of the contact spheres, for spheres = ''dense''', &
@@ -299,8 +300,7 @@ contains
     call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
       example='0.15, 0.05, 0.16', required=.not. table)
     call v%integer('count', drop%count, between(1, max_drops), 'how many blocks', example='6')
-    call v%without_meaning(drop%count == 1 .and. v%good('count') .and. .not. table, 'to', &
-      'count = 1', 'a line needs more blocks')
+    if (drop%count == 1 .and. v%good('count') .and. .not. table) call v%pass_over('to', 'count = 1')
     call v%real('to', drop%to, any_number('m'), 'the last block is here, the others evenly ' &
       //'between position and here', example='count = 6  to = 0.2, 0.05, 0.16')
     call v%real('first_time', drop%first_time, not_negative('s'), 'when the first is let go, or ' &
@@ -313,16 +313,15 @@ contains
     call v%option('orientation', drop%orientation, 'given random', 'attitude of the blocks: by ' &
       //'quaternion, or axis and angle_deg; or at random, any rotation as likely as another', &
       example='''random''')
-    call v%without_meaning(drop%orientation == 'random', 'quaternion axis angle_deg tilt_deg', &
-      'orientation = ''random''', 'any attitude is as likely as another')
+    if (drop%orientation == 'random') call v%pass_over('quaternion axis angle_deg tilt_deg', &
+      'orientation = ''random''')
     call visit_attitude(v, drop%quaternion)
     call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
       'each block is tilted at random by up to this about an axis at random', example='10')
     call v%integer('seed', drop%seed, whole, 'the random places and attitudes: ' &
       //'another number draws others, the same number the same on every machine', example='7')
     call visit_handling(drop%handling)
-    call v%without_meaning(drop%handling%lowering_speed > 0.0_wp, 'velocity', &
-      'lowering_speed > 0', 'a block is let go with the speed of lowering')
+    if (drop%handling%lowering_speed > 0.0_wp) call v%pass_over('velocity', 'lowering_speed > 0')
     call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
       example='0, 0, -0.1')
     call v%judge('file shape shapes weights position count to first_time interval spread ' &
@@ -378,8 +377,6 @@ contains
         'needs lowering_speed above 0')
       if (handling%release /= 'height') call v%pass_over('release_height', &
         'release = '//quoted_text(trim(handling%release)))
-      if (handling%release == 'height') call v%needed('release_height', &
-        'height over what lies below [m]')
       call v%real('release_height', handling%release_height, not_negative('m'), &
         'how far above what lies below a lowered block is let go', &
         example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')

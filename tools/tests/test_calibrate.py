@@ -33,6 +33,7 @@ def test_finds_what_is_known(
     case = tmp_path / "a.nml"
     case.write_text(CASE)
     words = ["calibrate", str(case), "--shape", "unit", "--falls", "2", "--program", str(MICS)]
+    words += ["--set", "run.title=set"]
     assert mics_tools([*words, "--out", str(tmp_path / "out")]) == 0
     found = json.loads((tmp_path / "out" / "calibrate.json").read_text())
     assert found["drag_coefficient"] == pytest.approx(0.8, rel=0.03)
@@ -43,7 +44,5 @@ def test_finds_what_is_known(
 
 
 def test_a_shape_that_is_not_there(tmp_path: Path) -> None:
-    case = tmp_path / "a.nml"
-    case.write_text(CASE)
     with pytest.raises(BadRun, match="no such &shape; it has: other, unit"):
-        Calibration(MICS, case, "block", tmp_path / "out")
+        Calibration(MICS, CASE, "block", tmp_path / "out")

@@ -17,7 +17,6 @@ import f90nml
 import h5py
 import numpy as np
 
-from micstools.cases import program
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array
 
@@ -105,10 +104,10 @@ def smallest(squares: Array) -> float:
 class Calibration:
     """Falls of one shape of a case: runs in folders of their own, and the fit to them."""
 
-    def __init__(self, mics: Path, case: Path, shape: str, folder: Path, threads: int = 1) -> None:
-        """Find the size of the shape; nothing has fallen yet."""
+    def __init__(self, mics: Path, text: str, shape: str, folder: Path, threads: int = 1) -> None:
+        """Find the size of the shape of a case; nothing has fallen yet."""
         self.mics, self.folder, self.threads, self.shape = mics, folder, threads, shape
-        self.case = f90nml.reads(program.case_text(case, []))
+        self.case = f90nml.reads(text)
         folder.mkdir(parents=True, exist_ok=True)
         self.length = 1.0
         self.length = self._extent()

@@ -22,10 +22,11 @@ def work(given: argparse.Namespace) -> int:
     found = height_maps.moved(height_maps.filled(found, given.fill), (x, y, z), given.scale)
     if given.stones:
         found = stones.lay(found, given.stones, given.seed)
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    height_maps.write(given.out, found, f"heights of {given.file.name} [m]")
+    out = given.out or given.file.with_suffix(".bed.txt")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    height_maps.write(out, found, f"heights of {given.file.name} [m]")
     print(height_maps.report(found))
     if missing:
         print(f"{'filled':10}{missing} points with {given.fill:g} m")
-    print(f"{given.out}\n&bed file = '{given.out}' /")
+    print(f"{out}\n&bed file = '{out}' /")
     return 0

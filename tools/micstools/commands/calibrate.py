@@ -12,8 +12,9 @@ from micstools.cases.calibrate import Calibration
 
 def work(given: argparse.Namespace) -> int:
     folder = given.out or Path(f"mics-calibrate-{given.shape}")
-    found = Calibration(program.find(given.program, given.case), given.case, given.shape, folder,
-                        given.threads).fit(given.falls)  # fmt: skip
+    path = program.find(given.program, given.case)
+    text = program.case_text(given.case, given.settings)
+    found = Calibration(path, text, given.shape, folder, given.threads).fit(given.falls)
     files.write(folder / "calibrate.json", json.dumps(asdict(found), indent=1) + "\n")
     print(
         f"! &shape '{found.shape}', {found.note}: {len(found.falls)} falls, scatter "
