@@ -112,6 +112,11 @@ contains
     end associate
     call check('panels of a sphere', added%mass, 0.5_wp, 0.02_wp)
     call check('a sphere turns nothing', added%inertia < 0.01_wp)
+    associate (ball => world%shapes(1))   ! twice as long: .240 about two axes (Lamb, art. 115)
+      ball%point(3, :) = 2*ball%point(3, :)
+      added = added_inertia(surface_panels(ball), 12*ball%inertia(3, 3)/ball%density)
+    end associate
+    call check('it does if it is longer', added%inertia, 0.2_wp, 0.01_wp)
     added = added_inertia_of(world%shapes(5))
     call check('a slab pushes more one way than the other', added%spread > 1.0_wp)
     turned = added_inertia_of(world%shapes(6))
@@ -122,6 +127,7 @@ contains
   !> Held bodies: what is there at the start does not lift the level, what comes later does, and
   !! buoyancy is that of the part below it.
   subroutine check_level()
+    real(wp), parameter :: tilt = 0.2_wp
     type(world_t) :: world
     real(wp) :: cut, want
 
@@ -144,6 +150,12 @@ contains
     world%blocks%present(3) = .false.
     call enter(gravity, world)
     call check('the level after it left', world%light%level, level, 1.0e-15_wp)
+    call start(2300.0_wp, world, at(level, q=quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
+      tilt), more='fixed=T'))
+    call enter(gravity, world)
+    want = rho*g*edge**4*sin(tilt)*(1.0_wp - tan(tilt)**2)/24
+    call check('a tilted cube is turned on', world%light%force(4:6, 1)/want, &
+      [0.0_wp, 1.0_wp, 0.0_wp], 1.0e-12_wp)
   end subroutine check_level
 
   !> A block let go under water: (s - 1) g/(s + a), and the force in the books.
@@ -158,6 +170,9 @@ contains
     call check('start of a fall', world%blocks%v(3, 1)/dt/want, 1.0_wp, 1.0e-5_wp)
     call check('M dU/dt is the sum of forces', own_mass(world%blocks, 1)*(world%blocks%v(3, 1)/dt &
       + g), world%blocks%fluid_force(3, 1), 1.0e-12_wp*own_mass(world%blocks, 1)*g)
+    call check('which is that of the water less what its added mass takes', world%light%force(3, &
+      1) - (world%blocks%mass(1) - own_mass(world%blocks, 1))*world%blocks%v(3, 1)/dt, &
+      world%blocks%fluid_force(3, 1), 1.0e-12_wp*own_mass(world%blocks, 1)*g)
     call check('shares in the added mass', world%blocks%mass(1)/own_mass(world%blocks, 1) &
       - 1.0_wp, world%light%added(1)%mass/s, 1.0e-12_wp)
   end subroutine check_start
@@ -256,16 +271,21 @@ contains
   subroutine check_spin()
     type(world_t) :: world
     real(wp), parameter :: spin = 5.0_wp
-    real(wp) :: grown
+    real(wp) :: grown, brake
 
     call start(rho, world, at(0.07_wp, more='angular_velocity=0,0,5'))
     call enter(gravity, world)
     call step(1, 1.0e-9_wp, world)
     call check('release keeps the spin', world%blocks%omega(3, 1)/spin, 1.0_wp, 1.0e-6_wp)
+    ! The integral of C/2 rho w^2 y^2 sqrt(y^2 + a^2) over four sides; facets see .78 of it.
+    brake = rho*0.55_wp*spin**2*(3*sqrt(2.0_wp) - asinh(1.0_wp))*(edge/2)**5
+    call check('torque of the drag', world%light%force(6, 1)/brake, -1.0_wp, 0.25_wp)
     call step(400, 1.0e-3_wp, world)
     call check('drag brakes it', world%blocks%omega(3, 1) < 0.9_wp*spin .and. &
       world%blocks%omega(3, 1) > 0.0_wp)
     grown = 1.0_wp + world%light%added(1)%inertia
+    call check('which is in the books without what the water takes', &
+      world%blocks%fluid_torque(3, 1)*grown/world%light%force(6, 1), 1.0_wp, 1.0e-9_wp)
     world%blocks%omega(3, 1) = spin
     world%blocks%l(3, 1) = spin*grown*world%blocks%shapes(1)%inertia(3, 3)
     world%blocks%x(3, 1) = level + edge

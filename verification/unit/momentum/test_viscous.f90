@@ -3,7 +3,7 @@ module test_viscous_m
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use check_m, only: check, wp, pi
   use errors_m, only: to_text
-  use rigid_motion_m, only: set_inertia
+  use rigid_motion_m, only: set_inertia, wall_velocity
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_links_m, only: build_viscous
   use merged_cells_m, only: merged_cells_t
@@ -167,6 +167,8 @@ contains
 
   !> Fluid at rest around a body that moves and turns.
   subroutine body_in_the_system()
+    integer :: i, j, k
+
     call make_wall(heights(2))
     tank%bodies%x(:, 1) = [0.3_wp, 0.6_wp, -0.2_wp]
     tank%bodies%motion(:, 1) = [0.3_wp, -0.2_wp, 0.5_wp, 0.7_wp, -0.4_wp, 0.6_wp]
@@ -175,6 +177,21 @@ contains
     call check('the block of a body in the system holds it as its links do', viscous%force(:, 1), &
                -matmul(viscous%body_matrix(:, :, 1), tank%bodies%motion(:, 1)), 1.0e-13_wp)
     call check('they do', norm2(viscous%force(4:6, 1)) > 1.0e-3_wp)
+    call place('&grid cells=3*10 length=3*1/ '//fluid//'&shape name="b" kind="box" size=3*.4/ ' &
+      //body('b', [0.5_wp, 0.5_wp, 0.5_wp])//slip, tank)
+    tank%bodies%motion(:, 1) = [0.3_wp, -0.2_wp, 0.5_wp, 0.7_wp, -0.4_wp, 0.6_wp]
+    do k = 1, 10
+      do j = 1, 10
+        do i = 1, 10
+          tank%flow%u(i, j, k, :) = wall_velocity(tank%bodies%motion(:, 1), &
+            tank%grid%centre([i, j, k], [1, 2, 3]) - 0.5_wp)
+        end do
+      end do
+    end do
+    call viscous_init(tank%grid, 1, viscous)
+    call build(5.0_wp)
+    call pull_of_links(viscous, tank%flow%u, tank%bodies%motion, viscous%force)
+    call check('what turns as one does not rub', maxval(abs(viscous%force(:, 1))) < 1.0e-12_wp)
   end subroutine body_in_the_system
 
   !> The small cell above the wall, centre inside, hangs on the cell above it as on a lever, its

@@ -218,7 +218,7 @@ contains
   subroutine two_halves()
     type(one_body_t) :: elsewhere
     type(merged_cells_t) :: before
-    real(wp) :: sums(3)
+    real(wp) :: sums(3), turns(3), f(3)
     integer :: i, j, k
 
     before = merged
@@ -236,20 +236,23 @@ contains
     call place_box(0.56_wp, elsewhere, before)
     a%kicked(6, 4, 5) = .false.
     sums = 0.0_wp
+    turns = 0.0_wp
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
           call random_numbers(seed, kick(i, j, k, :))
           if (max(before%number(i, j, k), merged%number(i, j, k)) == 0) cycle
-          sums = sums - kick(i, j, k, :)
-          if (.not. a%kicked(i, j, k)) cycle
-          sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k) &
-                        *a%cell(i, j, k, :)
+          f = -kick(i, j, k, :)
+          if (a%kicked(i, j, k)) f = f + 0.5_wp*dt*box%case%fluid%liquid_density &
+            *box%flow%fluid_volume(i, j, k)*a%cell(i, j, k, :)
+          sums = sums + f
+          turns = turns + cross(box%grid%centre([i, j, k], [1, 2, 3]) - middle, f)
         end do
       end do
     end do
     call find_halves(before)
     call check('momentum of the halves goes to the body', dt*force(1:3, 1), sums, 1.0e-11_wp)
+    call check('and their torque', dt*force(4:6, 1), turns, 1.0e-11_wp)
   end subroutine two_halves
 
   subroutine find_halves(before)
