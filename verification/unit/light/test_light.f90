@@ -150,6 +150,12 @@ contains
     world%blocks%present(3) = .false.
     call enter(gravity, world)
     call check('the level after it left', world%light%level, level, 1.0e-15_wp)
+    call start(2300.0_wp, world, '&boundary x_max="outflow"/ '//at(0.06_wp, &
+      more='fixed=T release_time=1'))
+    call enter(gravity, world)
+    call release_body(1.0_wp, 1, world%blocks)
+    call enter(gravity, world)
+    call check('the sea outside keeps its level', world%light%level, level, 1.0e-15_wp)
     call start(2300.0_wp, world, at(level, q=quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
       tilt), more='fixed=T'))
     call enter(gravity, world)

@@ -186,6 +186,8 @@ contains
     box%solid%edge = 0.0_wp
     call at_walls()
     call check('a line to the wall', box%flow%uf(7, 6, 5, 1), share*stream(1), tolerance)
+    call check('a face partly open', box%flow%uf(6, 4, 7, 3), &
+      0.5_wp*0.3_wp*1.15_wp/(0.35_wp*0.7_wp)*stream(3), tolerance)
     merged%slip = 0.25_wp
     call at_walls()
     associate (n => [0.8_wp, 0.7_wp, 0.0_wp]/norm2([0.8_wp, 0.7_wp]), s => share/(share + 3.0_wp))

@@ -3,7 +3,7 @@
 !! one.
 module test_merged_cells_m
   use check_m, only: check, wp
-  use grid_m, only: n_halo
+  use grid_m, only: n_halo, unit_step
   use merged_cells_m, only: merged_cells_t, find_merged_cells, is_unmerged, match_densities
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
@@ -41,7 +41,29 @@ contains
     call the_rest()
     call water_under_gas()
     call closing_face()
+    call narrow_cells()
   end subroutine test_merged_cells
+
+  !> In cells half as wide in y a small cell at an edge shares by the areas of its faces.
+  subroutine narrow_cells()
+    real(wp) :: w(3)
+    integer :: d, f(3), edges
+
+    call place('&grid cells=8,16,7 length=.8,.8,.7/ &shape name="b" kind="box" ' &
+               //'size=.36,.36,.37/ &body shape="b" position=.39,.4,.185/ '//slip, box, merged)
+    edges = 0
+    do m = 1, merged%n_small
+      if (count(merged%share(:3, m) > 0.0_wp) < 2) cycle
+      edges = edges + 1
+      do d = 1, 3
+        f = merged%cell(:, m) + merge(unit_step(:, d), 0, merged%normal(d, m) > 0.0_wp)
+        w(d) = merge(box%solid%aperture(f(1), f(2), f(3), d)*box%grid%area(d) &
+          *abs(merged%normal(d, m)), 0.0_wp, merged%share(d, m) > 0.0_wp)
+      end do
+      call check('shares by area', merged%share(:3, m), w/sum(w), 1.0e-12_wp)
+    end do
+    call check('there are edges', edges > 4)
+  end subroutine narrow_cells
 
   !> Who belongs to whom.
   subroutine the_targets()

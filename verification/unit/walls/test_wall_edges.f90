@@ -40,6 +40,9 @@ contains
     call check('a corner', edge([3, 3, 3]), 1.0_wp)
     call check('an edge beside the centre of its cell', edge([6, 6, 4]), 0.0_wp)
     call held_at_edge()
+    call build('kind="box" size=.29,.29,.36', 'position=.385,.385,.39/ &body shape="b" ' &
+      //'position=.045,.385,.39')
+    call check('none in a gap', body%solid%effective(3, 3, 4, 1), body%solid%aperture(3, 3, 4, 1))
   end subroutine upright_box
 
   !> Cell (3, 3, 4) holds 0.36 of solid: a plane wall would leave 2 - sqrt(0.72) of the faces of a
