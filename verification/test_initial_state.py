@@ -12,7 +12,7 @@ from test_input import mics
 
 CASE = """&run t_end = 0.001 dt = 0.001 physics = 'fluid' field_interval = 1 /
 &grid cells = 6, 4, 5  length = 0.6, 0.4, 0.5 /
-&boundary x_min = 'periodic' x_max = 'periodic' y_min = 'slip' y_max = 'slip'
+&boundary x_min = 'periodic' x_max = 'periodic' y_min = 'periodic' y_max = 'periodic'
   z_min = 'slip' z_max = 'slip' /
 &fluid initial_state = 'state.h5' """
 SHAPE = (5, 4, 6)
@@ -22,7 +22,7 @@ ONES = np.ones(SHAPE)
 def wave() -> np.ndarray:
     """A velocity free of divergence that no wall hinders."""
     velocity = np.zeros((*SHAPE, 3))
-    velocity[..., 0] = np.arange(5)[:, None, None]
+    velocity[..., :2] = np.arange(5)[:, None, None, None] * [1.0, 0.5]
     return velocity
 
 

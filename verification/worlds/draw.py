@@ -226,8 +226,7 @@ def bed(draw: Draw, across: float, length: list[float]) -> Table:
 def body(
     draw: Draw, k: int, place: list[float], across: float, time: float, plain: bool
 ) -> tuple[str, Group]:
-    """Block k near a place, which is held, moved or free; if not `plain`, dropped or lowered, or
-    moved by a table of ways and turns, in its group until `world` takes it out."""
+    """Block k near a place: held, moved, free; if not `plain`, dropped, lowered or on a table."""
     speed, lazy = sqrt(GRAVITY * across), draw(number(0.0, 1.0))
     here = rounded([p + across * draw(around(0.05)) for p in place])
     found: Group = {"shape": f"s{k}", "position": here, "quaternion": draw(attitude())}
@@ -345,8 +344,7 @@ def world(
 
 @st.composite
 def busy(draw: Draw, kinds: tuple[str, ...] = ("coupled", "dry", "light")) -> World:
-    """Such worlds whose blocks come late, held ones too, wait for room, hang in slings until they
-    stand, and leave through the sides of x."""
+    """Blocks come late, held ones too, wait, hang in slings, and leave through the sides of x."""
     found = draw(world(kinds))
     t_end, speed = found.value("run", "t_end"), 1e3 * found.value("run", "rest_speed")
     if draw(st.booleans()) and found.value("boundary", "x_max") != "outflow":
