@@ -49,15 +49,15 @@ def test_a_plate_pushes_a_cube(physics: str, tmp_path: Path) -> None:
 
 
 def test_sleepers_wake_for_it(tmp_path: Path) -> None:
-    """A cube asleep on a held plate is carried when that begins to rise after two seconds."""
-    table = "time,x,y,z\n2,0.06,0.04,0.03\n2.5,0.06,0.04,0.05\n"
+    """A cube asleep on a held plate follows it when that begins to sink after two seconds."""
+    table = "time,x,y,z\n2,0.06,0.04,0.03\n2.5,0.06,0.04,0.01\n"
     case = DRY.format(end=3.0) + PLATE.replace("0.01, 0.06, 0.06", "0.06, 0.06, 0.01")
     case += MOVED.format(more="") + CUBE.replace("0.04, 0.01 /", "0.04, 0.0451 /")
     with run(tmp_path, case, table) as h5:
         time, x = h5["bodies/time"][:], h5["bodies/position"][:, 1, 2]
         before = h5["series/sleeping"][:][np.searchsorted(time, 1.99)]
         assert before == 1
-        assert x[-1] - x[np.searchsorted(time, 1.99)] == pytest.approx(0.02, abs=1e-5)
+        assert x[-1] - x[np.searchsorted(time, 1.99)] == pytest.approx(-0.02, abs=1e-5)
 
 
 def test_steady_rows_are_a_given_velocity(tmp_path: Path) -> None:

@@ -116,6 +116,12 @@ contains
       if (i <= 100) call check('held', abs(s), 0.0_wp)
       last = s
     end do
+    call given_motion_init([0.0_wp, 1.0_wp, 2.0_wp, 2.5_wp], x, q(:, [1, 4, 3, 1]), motion)
+    do i = 0, 250
+      call pose_at(motion, 0.01_wp*i, at, turned, v, omega)
+      s = 2.0_wp*atan2(turned(3), turned(1))
+      call check('turns back at a row', s >= -1.0e-15_wp .and. s <= 1.2_wp + 1.0e-15_wp)
+    end do
   end subroutine check_hinge
 
   !> Rows of a steady motion: between the inner ones it is steady.

@@ -6,7 +6,7 @@ module test_sleep_m
   use rigid_body_m, only: release_body, kinetic_energy, potential_energy, set_velocity_after_fluid
   use displacements_m, only: reserve_displacements
   use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, wake_tolerance, store_quiet, &
-    may_sleep, update_loads
+    may_sleep, update_loads, update_stillness
   use world_m, only: world_t, set_up, begin, body, move
   implicit none
   private
@@ -59,6 +59,7 @@ contains
     type(world_t) :: world
     type(sleep_t) :: sleep
     real(wp) :: way, fall
+    logical :: woke
     integer :: b, n
     real(wp), parameter :: radius = 0.3_wp
 
@@ -81,6 +82,11 @@ contains
       call check('turns too fast', sleep%quiet(:2), [11*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
       call creep(world, way, [1.01_wp, 0.0_wp], 0.0_wp, sleep)
       call check('moves too fast', sleep%quiet(1), 0.0_wp)
+      blocks%asleep(2) = .true.
+      blocks%still(1) = .true.
+      blocks%path(1)%n = 2
+      call update_stillness(blocks, woke)
+      call check('what starts on a path wakes all', woke .and. .not. blocks%asleep(2))
     end associate
   end subroutine check_quiet
 
