@@ -343,9 +343,9 @@ def world(
 
 
 @st.composite
-def busy(draw: Draw, kinds: tuple[str, ...] = ("coupled", "dry", "light")) -> World:
+def busy(draw: Draw) -> World:
     """Blocks come late, held ones too, wait, hang in slings, and leave through the sides of x."""
-    found = draw(world(kinds))
+    found = draw(world(("coupled", "dry", "light")))
     t_end, speed = found.value("run", "t_end"), 1e3 * found.value("run", "rest_speed")
     if draw(st.booleans()) and found.value("boundary", "x_max") != "outflow":
         found = found.changed("boundary", x_min="outflow", x_max="outflow")

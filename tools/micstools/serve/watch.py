@@ -139,8 +139,8 @@ class Ensemble:
         found: dict[Member, ensemble.State] = {}
         running: dict[int, living.State] = {}
         for member in self.members():
-            alive = member.number not in self.done and living.holder(member.result / "run.lock")
-            far = self.of(member).state() if alive else None
+            one = self.of(member)
+            far = one.state() if member.number not in self.done and one.goes_on else None
             end = self.done.get(member.number) or ensemble.state(member)
             if end.counts:
                 self.done[member.number] = end
