@@ -7,10 +7,9 @@ Parts: `jobs` (the start of the main job, a dam break, a dry pile; on one thread
 ranks), `growth` (ever more cells and blocks: time and memory of each) and, when asked for, `whole`
 (the tanks of the paper to their end: minutes).
 
-Each job is run `--repeat` times; the table shows the fastest and how much longer the slowest took,
-reading and writing included. `each` is the CPU time of a cell and step, or of a block and substep.
-Other programs at work spoil figures, so the load beforehand is told; so is how much work that many
-programs get done at once: two virtual cores of a rented machine are often the halves of one.
+Each job is run `--repeat` times; the table shows the fastest and how much longer the slowest took.
+`each` is the CPU time of a cell and step, or of a block and substep. Told are the load beforehand
+and how much work that many programs get done at once: two virtual cores are often halves of one.
 """
 
 import argparse
@@ -46,15 +45,11 @@ def main() -> None:
     means = parts.Means((program, program.with_name("mics_mpi")), given.repeat, given.threads)
     old = table.read(given.against) if given.against else None
     found = {
-        "version": parts.version(program),
-        "processor": processor(),
-        "cores": os.cpu_count(),
-        "threads": given.threads,
-        "repeat": given.repeat,
-        "load_before": os.getloadavg()[0],
+        "version": parts.version(program), "processor": processor(), "cores": os.cpu_count(),
+        "threads": given.threads, "repeat": given.repeat, "load_before": os.getloadavg()[0],
         "work_at_once": round(work_at_once(given.threads), 2),
         "bandwidth": float(f"{bandwidth():.3g}"),
-    }
+    }  # fmt: skip
     print(
         f"{found['processor']}: {given.threads} programs at once do {found['work_at_once']} times "
         f"the work of one,\none adds {found['bandwidth'] / 1e9:.1f} GB/s in memory; "

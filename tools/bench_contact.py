@@ -4,15 +4,12 @@ usage: python tools/bench_contact.py [--n 64] [--time 2] [--box 0.3] [--seed 1] 
                                      [--dt 0.1] [--contact-time 0.008]
                                      [--program ./mics]
 
-N hexapods (edge of a cube 20 mm, 2300 kg/m3) start on a loose grid with random attitudes above
-the floor of a square tank, fall and pile up; friction 0.5, restitution 0.3, exact surfaces. `--dt`
-is the `dt` of the case, its history step; substeps of contact last at most a twentieth of it and of
-`--contact-time`, so that 0.1 leaves the choice to the latter. Blocks stay awake without `--sleep`.
-
-Prints one JSON line: CPU and wall seconds of the whole run, reading and writing included, substeps
-of contact (`dt` is the mean one), and of the pile at the end heights of the centroids, share of
-solid below the 80th percentile of these, true depth of surface points inside other blocks (at the
-end and, `pen_late_mm`, the largest over the last half second), and blocks outside the tank.
+N hexapods (edge of a cube 20 mm, 2300 kg/m3) on a loose grid with random attitudes fall into a
+square tank and pile up; friction 0.5, restitution 0.3, exact surfaces. Blocks stay awake without
+`--sleep`. Prints one JSON line: CPU and wall seconds of the whole run, substeps of contact (`dt` is
+the mean one), and of the pile at the end heights of the centroids, share of solid below the 80th
+percentile of these, depth of surface points inside other blocks (`pen_late_mm`: the largest over
+the last half second), and blocks outside the tank.
 """
 
 import argparse
@@ -53,24 +50,14 @@ def main() -> None:
         run = Run(folder / "result")
         steps = took.steps
         found = {
-            "version": str(run.provenance.get("version", "")),
-            "n_blocks": given.n,
-            "box": given.box,
-            "time": given.time,
-            "dt": given.time / steps,
-            "history_dt": given.dt,
-            "contact_time": given.contact_time,
-            "sleep": given.sleep,
-            "steps": steps,
-            "threads": given.threads,
-            "wall_s": took.wall,
-            "cpu_s": took.cpu,
-            "memory_mb": took.memory / 1e6,
-            "wall_per_block_step": took.wall / (given.n * steps),
+            "version": str(run.provenance.get("version", "")), "n_blocks": given.n,
+            "box": given.box, "time": given.time, "dt": given.time / steps, "steps": steps,
+            "history_dt": given.dt, "contact_time": given.contact_time, "sleep": given.sleep,
+            "threads": given.threads, "wall_s": took.wall, "cpu_s": took.cpu,
+            "memory_mb": took.memory / 1e6, "wall_per_block_step": took.wall / (given.n * steps),
             "cpu_per_block_step": took.cpu / (given.n * steps),
-            "wall_per_sim_s": took.wall / given.time,
-            **measure(run, given.box, given.every),
-        }
+            "wall_per_sim_s": took.wall / given.time, **measure(run, given.box, given.every),
+        }  # fmt: skip
     rounded = {k: float(f"{v:.5g}") if isinstance(v, float) else v for k, v in found.items()}
     print(json.dumps(rounded))
 

@@ -2,10 +2,9 @@
 
 usage: python tools/build_docs.py [--out build/docs]      (`make docs`)
 
-README, CHANGELOG, docs/ and verification/ become pages; names of files in them become links, and
-one that leads nowhere is an error. FORD makes the pages of the modules. Formulas become MathML and
-what FORD fetches from servers is put beside the pages, so that they can be read without a network.
-At the end every link of every page is followed. Exit code 1: a link, name or formula is wrong.
+README, CHANGELOG, docs/ and verification/ become pages, names of files in them links; FORD makes
+the pages of the modules. Formulas become MathML; what FORD fetches from servers is put beside the
+pages. At the end every link is followed. Exit code 1: a link, name or formula is wrong.
 """
 
 import argparse

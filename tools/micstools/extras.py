@@ -8,13 +8,10 @@ from micstools.reading.reader import BadRun
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
-    "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
-    "ensemble": ("cryptography", "dask_jobqueue", "distributed"),
-    "survey": ("ezdxf", "rasterio"),
-    "paper": ("weasyprint",),
-    "pictures": ("pyvista", "vtk"),
-    "serve": ("aiohttp",),
-}
+    "shape": ("gmsh", "manifold3d", "networkx", "trimesh"), "survey": ("ezdxf", "rasterio"),
+    "ensemble": ("cryptography", "dask_jobqueue", "distributed"), "paper": ("weasyprint",),
+    "pictures": ("pyvista", "vtk"), "serve": ("aiohttp",),
+}  # fmt: skip
 
 
 def need(extra: str) -> None:

@@ -238,18 +238,11 @@ def _write_bodies(
     group["impact_speed"] = np.linalg.norm(velocity, axis=2).max(axis=0)
     group["rest_since"] = [_still_since(time, position[:, k]) for k in range(n)]
     for name, values in {
-        "time": time,
-        "position": position,
-        "quaternion": quaternion,
-        "velocity": velocity,
-        "angular_velocity": np.zeros_like(position),
-        "fluid_force": 0.4 * force,
-        "fluid_torque": np.zeros_like(position),
-        "contact_force": 0.6 * force,
-        "contact_torque": np.zeros_like(position),
-        "contacts": touching,
+        "time": time, "position": position, "quaternion": quaternion, "velocity": velocity,
+        "fluid_force": 0.4 * force, "contact_force": 0.6 * force, "contacts": touching,
         "on_floor": np.zeros_like(touching),
-    }.items():
+        **dict.fromkeys(("angular_velocity", "fluid_torque", "contact_torque"), 0 * position),
+    }.items():  # fmt: skip
         group[name] = values
 
 
@@ -265,30 +258,18 @@ def _write_series(group: h5py.Group, time: Array, drops: int) -> None:
     falling = sum(np.exp(-(((time - k - 0.4) / 0.15) ** 2)) for k in range(drops))
     noise = rng.random(len(time))
     for name, values in {
-        "time": time,
-        "dt": 0.003 - 0.002 * falling,
-        "cfl": 0.4 + 0.1 * noise,
-        "divergence_max": 1e-7 * (0.2 + noise),
-        "pressure_passes": np.full(len(time), 2),
+        "time": time, "dt": 0.003 - 0.002 * falling, "cfl": 0.4 + 0.1 * noise,
+        "divergence_max": 1e-7 * (0.2 + noise), "pressure_passes": np.full(len(time), 2),
         "solver_iterations": (14 + 5 * noise).astype(int),
-        "liquid_volume": np.full(len(time), 4.35e-3),
-        "liquid_volume_drift": 1e-14 * (noise - 0.5),
-        "volume_excess_max": 1e-8 * noise,
-        "kinetic_energy_fluid": 0.02 * falling,
-        "kinetic_energy_bodies": 0.04 * falling,
-        "potential_energy_fluid": 3.2 + 0.03 * time,
-        "potential_energy_bodies": 1.2 - 0.08 * time,
-        "contact_energy": 1e-4 * falling,
-        "energy_excess": -0.1 * time,
-        "max_overlap": 2e-5 * noise,
-        "contact_courant_max": 0.05 * noise,
-        "substeps": np.full(len(time), 20),
-        "sleeping": np.zeros(len(time)),
-        "curvature_fallback": np.zeros(len(time)),
-        "transport_parts": np.ones(len(time)),
-        "inertia_clips": np.zeros(len(time)),
-        "wall_time": 0.1 * np.arange(len(time)),
-    }.items():
+        "liquid_volume": np.full(len(time), 4.35e-3), "liquid_volume_drift": 1e-14 * (noise - 0.5),
+        "volume_excess_max": 1e-8 * noise, "kinetic_energy_fluid": 0.02 * falling,
+        "kinetic_energy_bodies": 0.04 * falling, "potential_energy_fluid": 3.2 + 0.03 * time,
+        "potential_energy_bodies": 1.2 - 0.08 * time, "contact_energy": 1e-4 * falling,
+        "energy_excess": -0.1 * time, "max_overlap": 2e-5 * noise,
+        "contact_courant_max": 0.05 * noise, "substeps": np.full(len(time), 20),
+        "transport_parts": np.ones(len(time)), "wall_time": 0.1 * np.arange(len(time)),
+        **dict.fromkeys(("sleeping", "curvature_fallback", "inertia_clips"), np.zeros(len(time))),
+    }.items():  # fmt: skip
         group[name] = values
 
 

@@ -1,9 +1,8 @@
 """Damaged input files: each must be refused with a message, or taken, soon and in little memory.
 
-Every file starts as a good one of its kind and is damaged one to three times: 10,000 cases, 3,000
-files of each other kind. The program reads it with --check; where it takes the file, it also makes
-a few steps with it. A failure is an end by a signal, an exit code that is none of the program's, a
-message that is not its own, 20 s, or 4 GB. The last two hold for a single file of at most a few kB.
+Good files are damaged one to three times: 10,000 cases, 3,000 of each other kind. The program
+reads them with --check, and makes a few steps with those it takes. A failure is an end by a signal,
+an exit code or message that is not the program's, 20 s, or 4 GB.
 
 Files that failed are kept in build/fuzz. The program is ./mics_san, which finds most, if `make
 SAN=1` has made it, else ./mics. Words: kinds.

@@ -1,15 +1,13 @@
 """Runs that are killed or stopped at any moment: what they wrote goes on to the same bits.
 
-`kills`: 200 times a short wet run is ended by kill -9 at a moment between its start and its end; of
-several processes one is killed. `signals`: 50 times mpirun, with two to four processes, gets
-SIGTERM, SIGINT, SIGHUP or SIGUSR1, or one of its processes is killed. Then must hold: all processes
-are gone within 20 s; every result file can be read to its last byte, and its complete rows and
-frames are those of an undisturbed run; a run that had begun its steps, and was not killed, has a
-restart file of its last step and says how it ended; each restart file goes on, in a copy and, the
-newest, in the same folder, to the same bits. Before the first one there is nothing to go on from,
-and a file may have been in the making: then a second run must take the folder. Open MPI kills what
-is not gone a second after SIGTERM, SIGINT or SIGHUP; every other time it is told to wait for 5. (It
-then always does so, twice, however soon the processes are done.) Words: kills, signals.
+`kills`: 200 times a short wet run, or one of its processes, is ended by kill -9 at any moment.
+`signals`: 50 times mpirun, with two to four processes, gets SIGTERM, SIGINT, SIGHUP or SIGUSR1, or
+one of its processes is killed. Then must hold: all processes are gone within 20 s; every result
+file can be read to its last byte, with the complete rows and frames of an undisturbed run; a run
+that had begun its steps, and was not killed, has a restart file of its last step and says how it
+ended; each restart file goes on, in a copy and, the newest, in the same folder, to the same bits;
+without one a second run takes the folder. Open MPI kills what is not gone a second after SIGTERM,
+SIGINT or SIGHUP; every other time it is told to wait for 5. Words: kills, signals.
 """
 
 import os

@@ -11,16 +11,9 @@ from worlds.world import Group, Table, World
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 GRAVITY = 9.8125
 REACH = {  # farthest point of a shape from its centre, over its size
-    "cube": 0.867,
-    "sphere": 0.5,
-    "box": 0.867,
-    "cylinder": 0.708,
-    "hexapod": 1.66,
-    "tetrapod": 0.72,
-    "dolos": 0.72,
-    "reef_cube": 0.867,
-    "rock": 1.0,
-}
+    "cube": 0.867, "sphere": 0.5, "box": 0.867, "cylinder": 0.708, "hexapod": 1.66,
+    "tetrapod": 0.72, "dolos": 0.72, "reef_cube": 0.867, "rock": 1.0,
+}  # fmt: skip
 EVEN = ("cube", "sphere", "box", "hexapod")
 """Shapes that are their own image in mirrors across their axes."""
 ALONG_X = dict.fromkeys((f"{d}_{s}" for d in "xyz" for s in ("min", "max")), "slip") | {

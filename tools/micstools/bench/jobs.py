@@ -58,16 +58,8 @@ def whole(name: str) -> str:
 def dam_break(dam: DamBreak = DAM) -> str:
     """The case of a dam break."""
     cells, length, column = (", ".join(map(repr, v)) for v in (dam.cells, dam.length, dam.column))
-    return f"""\
-&run title = 'Dam break of the bench'  physics = 'fluid'  t_end = {dam.seconds}  dt = 5.0e-3
-  field_interval = 0  restart_interval = 0 /
-&grid cells = {cells}  length = {length} /
-&boundary x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip'
-  z_min = 'slip'  z_max = 'open' /
-&fluid liquid_density = {dam.water[0]}  liquid_viscosity = {dam.water[1]}
-  gas_density = {dam.air[0]}  gas_viscosity = {dam.air[1]} /
-&water min = 0.0, 0.0, 0.0  max = {column} /
-"""
+    text = Path(__file__).with_name("dam_break.nml").read_text()
+    return text.format(dam=dam, cells=cells, length=length, column=column)
 
 
 def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:

@@ -11,14 +11,8 @@ from micstools import files
 from micstools.cases import settings
 from micstools.reading.reader import BadRun
 
-_FILES = (
-    ("shape", "file"),
-    ("drop", "file"),
-    ("bed", "file"),
-    ("fluid", "initial_state"),
-    ("body", "motion"),
-    ("start", "file"),
-)
+_FILES = (("shape", "file"), ("drop", "file"), ("bed", "file"), ("fluid", "initial_state"),
+          ("body", "motion"), ("start", "file"))  # fmt: skip
 
 
 def from_here(text: str, folder: Path) -> str:

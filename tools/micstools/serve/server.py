@@ -1,11 +1,10 @@
 """A server for the person at this machine: it listens on the loopback address, answers the browser
 that opened it, and nobody whom another page sends.
 
-A name in `Host` other than ours is refused, so no name of a foreign page can be bent to us. The key
-in the address lets one browser in, once and soon; others of this machine can read it in no command
-line, for the browser is sent to a private file. From then on it has a cookie that other pages
-cannot send along. What changes something needs a token in a header, which a foreign page can
-neither read nor set.
+A name in `Host` other than ours is refused. The key in the address lets one browser in, once and
+soon; it stands in no command line, for the browser is sent to a private file. From then on it has a
+cookie that other pages cannot send along. What changes something needs a token in a header, which a
+foreign page can neither read nor set.
 """
 
 import asyncio

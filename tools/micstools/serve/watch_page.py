@@ -24,17 +24,12 @@ from micstools.shapes.geometry import Array
 SCRIPTS = ("live",)
 _ROWS = 8  # of the table of the step
 _STEP = (
-    ("t [s]", "time", ".5g"),
-    ("dt [s]", "dt", ".3g"),
-    ("Courant", "cfl", ".3f"),
-    ("div. [1/s]", "divergence_max", ".1e"),
-    ("passes", "pressure_passes", ".0f"),
-    ("iterations", "solver_iterations", ".0f"),
-    ("substeps", "substeps", ".0f"),
-    ("contact Courant", "contact_courant_max", ".3f"),
-    ("asleep", "sleeping", ".0f"),
+    ("t [s]", "time", ".5g"), ("dt [s]", "dt", ".3g"), ("Courant", "cfl", ".3f"),
+    ("div. [1/s]", "divergence_max", ".1e"), ("passes", "pressure_passes", ".0f"),
+    ("iterations", "solver_iterations", ".0f"), ("substeps", "substeps", ".0f"),
+    ("contact Courant", "contact_courant_max", ".3f"), ("asleep", "sleeping", ".0f"),
     ("drift", "liquid_volume_drift", ".1e"),
-)
+)  # fmt: skip
 _START = "const live = startLive();\n"
 Parts = dict[str, Markup]
 

@@ -6,17 +6,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-HEAD = """! {what}
-! cost: 0.2 s
-&run
-  title = '{what}'
-  physics = 'dry'
-  t_end = {end:.9g}
-  dt = {dt:.9g}
-  field_interval = 0.0
-  restart_interval = 0.0
-/
-"""
+HEAD = Path(__file__).with_name("head.txt").read_text()
 TANK = "&grid  cells = 70, 20, 20  length = 0.7, 0.2, {height:g} /\n"
 NO_WEIGHT = "&fluid gravity = 0.0, 0.0, 0.0 /\n"
 SHAPES = """&shape name = 'sphere'  kind = 'sphere'  size = 0.04 /

@@ -3,6 +3,7 @@
 from math import sqrt
 from pathlib import Path
 
+TEXT = Path(__file__).with_name("template.txt").read_text()
 PROTOTYPE, MODEL = 2.0, 0.05  # length of the block [m]
 SIZE = {"tetrapod": 1.0, "hexapod": 1 / 3, "dolos": 1.0, "cube": 1.0}  # of &shape [lengths]
 SEEDS = {"tetrapod": (1, 4, 5), "hexapod": (1, 2, 6), "dolos": (1, 2, 6), "cube": (1, 3, 4)}
@@ -19,29 +20,12 @@ def write(
     slow = sqrt(size / PROTOTYPE)
     name = f"{kind}_{'prototype' if size == PROTOTYPE else 'model'}"
     name += f"{'_tension' if tension else ''}_{cells:02d}_{100 * courant:03.0f}_{seed}.nml"
-    across, middle, spread = 4 * size, 2 * size, 0.15 * size
-    Path(name).write_text(f"""! A {kind} of {size:g} m, {cells} cells along it, seed {seed}.
-! cost: {8 if cells > 5 else 0.7 / courant:g} s
-&run
-  title = '{kind} of {size:g} m into water'
-  t_end = {2.2 * slow:.6g}
-  dt = {0.05 * slow:.6g}
-  cfl_max = {courant:g}
-  field_interval = 0.0
-  restart_interval = {2.2 * slow:.6g}
-/
-&grid  cells = {4 * cells}, {4 * cells}, {round(6.8 * cells)}
-  length = {across:g}, {across:g}, {6.8 * size:g} /
-&boundary  x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip' /
-&fluid  water_level = {5.025 * size:g}  liquid_density = 1025.0  surface_tension = {tension:g} /
-&contact  contact_time = {0.02 * slow:.6g} /
-&shape  name = 'block'  kind = '{kind}'  size = {SIZE[kind] * size:.9g}  density = 2400.0 /
-&drop
-  shape = 'block'  position = {middle:g}, {middle:g}, {5.8 * size:g}
-  velocity = 0.0, 0.0, -{0.5 * slow:.6g}
-  orientation = 'random'  spread = {spread:g}, {spread:g}, 0.0  seed = {seed}
-/
-""")
+    Path(name).write_text(TEXT.format(
+        kind=kind, size=size, cells=cells, seed=seed, courant=courant, tension=tension,
+        cost=8 if cells > 5 else 0.7 / courant, end=2.2 * slow, dt=0.05 * slow, speed=0.5 * slow,
+        contact=0.02 * slow, wide=4 * cells, high=round(6.8 * cells), across=4 * size,
+        top=6.8 * size, level=5.025 * size, edge=SIZE[kind] * size, middle=2 * size,
+        place=5.8 * size, spread=0.15 * size))  # fmt: skip
 
 
 for kind, seeds in SEEDS.items():

@@ -4,17 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-HEAD = """! {what}
-! cost: {cost} s
-&run
-  title = '{what}'
-  physics = 'dry'
-  t_end = {end}
-  dt = 1.0e-2
-  field_interval = 0.0
-  restart_interval = 0.0
-/
-"""
+HEAD = Path(__file__).with_name("head.txt").read_text()
 KINDS = """&shape name = 'hexapod'   kind = 'hexapod'   size = 0.02 /
 &shape name = 'cube'      kind = 'cube'      size = 0.04 /
 &shape name = 'tetrapod'  kind = 'tetrapod'  size = 0.05  refinement = 1 /
