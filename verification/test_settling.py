@@ -173,6 +173,9 @@ def test_any_interval_of_rows_tells_the_same(tmp_path: Path) -> None:
             assert np.array_equal(one.at_rest, same.at_rest, equal_nan=True)
     last = every[0][2]
     assert last.impact_speed == pytest.approx(np.sqrt(2 * 9.81 * 3.0), rel=0.02)
+    assert last.fall_time == pytest.approx(np.sqrt(2 * 3.0 / 9.81), rel=0.02)
+    few = every[-1][2]  # rows
+    assert np.isnan([few.fall_time, few.fastest, few.terminal, few.drift]).all()
     mean = [np.linalg.norm(run.bodies.contact_force[:, 2], axis=1).max() for run in runs]
     assert mean[0] == last.contact_force and mean[-1] < 0.5 * mean[0]
     assert [p.at_rest for p in places.places(runs[-1])] == [1, 1, 0]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 
 from calls import ROOT, mics_tools, python
 from micstools.piles import drawing, options
@@ -95,6 +96,11 @@ def test_the_plan_shows_what_is_off(tmp_path: Path, capsys) -> None:
     ]
     assert len(np.unique(colours[3:7], axis=0)) == 2 and len(np.unique(colours[:3], axis=0)) == 1
     assert drawing.drawn(figure, "svg") == drawing.drawn(drawing.plan(given), "svg")
+    arrows = next(c for c in axes.collections if isinstance(c, Quiver))
+    assert arrows.U[0] == pytest.approx(-0.12)
+    assert mics_tools(["report", str(folder), "--tolerance", "0.01"]) == 0
+    row = (folder / "report.html").read_text().split(">4 A1<")[1].split("</tr>")[0]
+    assert re.findall(r">([-\d.]+)<", row)[:4] == ["121.7", "-120.0", "-20.0", "-150.0"]
 
 
 def test_a_section_is_exact(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from micstools.reading.overlap import Placed
 from micstools.reading.reader import Run
 from micstools.reading.units import LABORATORY, SITE
 from micstools.shapes import shape as shapes
-from synthetic import UPRIGHT, Motion, reword, write_run
+from synthetic import UPRIGHT, Motion, change, reword, write_run
 
 TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"
 CLEAR = np.array([0.2, 0.05, 0.12])  # of the other blocks [m]
@@ -250,6 +250,15 @@ def test_numbers_of_each_block(make_run) -> None:
     force = np.linalg.norm(run.bodies.contact_force[:, 3], axis=1).max()
     assert found.contact_force == pytest.approx(force)
     assert found.weight == pytest.approx(56e-6 * 2300 * 9.81)
+    for name, n in (("max", 2), ("peak", 3)):
+        size = n * np.linalg.norm(run.bodies.contact_force, axis=2)
+        change(run.folder, f"bodies/contact_force_{name}", data=size)
+    change(run.folder, "bodies/release_time", data=np.array([0.0, 0, 0, 1.5]))
+    came = {"entry_time": np.zeros(4), "status": np.full(4, 2.0), "raised": np.zeros(4)}
+    for name, values in came.items():
+        change(run.folder, f"bodies/{name}", data=values)
+    (lowered,) = block_numbers.of_blocks(Run(run.folder))  # it touched before it was let go
+    assert (lowered.contact_force, lowered.peak_force) == pytest.approx((2 * force, 3 * force))
     assert found.turned == pytest.approx(0.0, abs=1e-6)
 
 
@@ -362,6 +371,7 @@ def test_paper_has_pictures_and_no_buttons(browser: Browser, report: Path) -> No
     browser.look(794, 1123, media="print")
     hidden = "getComputedStyle(document.querySelector('{}')).display === 'none'"
     assert browser.run(hidden.format(".player")) and not browser.run(hidden.format(".views"))
+    assert browser.run("getComputedStyle(document.documentElement).filter") == "none"  # colours
     assert browser.call("Page.printToPDF", preferCSSPageSize=True)["data"]
 
 

@@ -17,7 +17,7 @@ from browser import Browser
 from calls import mics_tools
 from micstools.pages import charts, ensemble_page
 from micstools.piles import drawing, pile_ensemble, pile_numbers, placing
-from micstools.reading import shares
+from micstools.reading import places, shares
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion, reword, write_run
@@ -194,6 +194,29 @@ def test_a_run_without_a_block_is_left_out(tmp_path: Path) -> None:
     assert pile_ensemble.open_ensemble(folder).left_out == {1: "no block in the tank", 3: "failed"}
 
 
+def test_a_block_that_left_is_counted(tmp_path: Path) -> None:
+    """Also where its run holds no other one."""
+    folder = write_ensemble(tmp_path, ENDS[:3])
+    for path, fixed in (("0001", 1e9), ("0002", 0.0)):
+        with h5py.File(folder / path / "result/run.h5", "r+") as h5:
+            bodies = h5["bodies"]
+            bodies["release_time"][:3] = fixed
+            bodies["status"] = np.array([2, 2, 2, 4])
+            bodies["exit_time"] = np.array([np.inf, np.inf, np.inf, 1.5])
+            bodies["position"][-1, 3, 0] = -0.01
+            bodies["entry_time"], bodies["raised"] = bodies["release_time"][:], np.zeros(4)
+    tank = placing.Area((0.0, 0.0), (0.3, 0.1), True)
+    found = pile_ensemble.open_ensemble(folder, area=tank)
+    assert found.left_out == {1: "all blocks out of the tank", 4: "failed"}
+    assert [row["out_of_tank"] for row in pile_ensemble.rows(found)] == [1, 0]
+    assert (found.placing.blocks, found.placing.outside) == (3, pytest.approx(2 / 3))
+    within = places.within(sum(pile_ensemble.places_of(found)[0], []), 1.0)
+    assert (within.units, within.count) == (3, 1)
+    assert mics_tools(["places", str(folder)]) == 0
+    with (folder / "places.csv").open() as file:
+        assert {row["run"] for row in csv.DictReader(file)} == {"1", "2", "3"}
+
+
 @pytest.mark.parametrize("text", ['{"format": "mics-ens', "{}", "[]", '{"format": "x"}'])
 def test_a_damaged_table_is_one_line(tmp_path: Path, text: str, capsys) -> None:
     (tmp_path / "ensemble.json").write_text(text)
@@ -208,6 +231,8 @@ def test_interval_of_a_median() -> None:
     assert pile_ensemble.median_interval([3, 1, 2, 6, 5, 4]) == (1, 6)
     assert np.isnan(pile_ensemble.median_interval([1, 2, 3, 4, 5])).all()
     assert pile_ensemble.spread_of([float("nan")]) is None
+    found = pile_ensemble.spread_of(list(range(1, 22)))
+    assert (found["5 %"], found["median"], found["95 %"]) == (2, 11, 20)
     many = pile_ensemble.median_interval(list(range(1, 2001)))  # by the normal distribution
     assert np.array(many) == pytest.approx(1000.5 + 0.98 * np.sqrt(2000) * np.array([-1, 1]), abs=1)
 

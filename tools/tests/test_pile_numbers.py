@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 from calls import mics_tools
+from micstools.pages import run_page
 from micstools.piles import layer, maps, pile_form, pile_numbers, placing
+from micstools.piles.handover import Handover
 from micstools.piles.maps import height_map
+from micstools.piles.options import Options
 from micstools.reading import block_numbers
 from micstools.reading.overlap import Placed, find_contacts, present_bodies, sphere_gap
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
 from micstools.shapes.geometry import quaternion_from_axis
-from synthetic import UPRIGHT, Motion, reword, with_bed
+from synthetic import UPRIGHT, Motion, change, reword, with_bed
 
 EDGE = 0.02
 WHOLE, SHORT = Motion(history_step=0.05), Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8))
@@ -38,6 +41,7 @@ def test_stacked_cubes(make_run) -> None:
     assert found.on_floor == 2
     assert found.top == pytest.approx(max(0.06, run.points(0, -1)[:, 2].max()))
     assert found.coordination == pytest.approx(2 * 2 / 7)
+    assert found.centre[2] == pytest.approx((0.10 + 3 * run.bodies.position[0, 0, 2]) / 7)
     assert found.spread[0] == pytest.approx(np.std([0.03] * 3 + [0.27, 0.09, 0.15, 0.21]))
     assert 3.5 < found.time_to_rest < 4.0  # the last is dropped at 3 s and takes 0.8 s
     area = np.linspace(0, 0.8, 17)
@@ -61,6 +65,7 @@ def test_a_door_is_no_part_of_the_pile(make_run) -> None:
     assert (found.blocks, found.height) == (3, pytest.approx(run.points(0, -1)[:, 2].max()))
     units, ground = layer.parted(run)
     assert (sorted(units), ground) == ([0, 2, 3], {})
+    assert "0.0552\u00a0kg in all" in run_page.page(run)  # of three cubes
 
 
 def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
@@ -69,6 +74,17 @@ def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
     assert pile_numbers.numbers(run, step=0.001).on_floor == 0
     run = with_bed(run.folder, lambda x, y: 0 * x + 0.01)
     assert pile_numbers.numbers(run, step=0.001).on_floor == 1
+
+
+def test_slopes_rise_from_the_bed(make_run) -> None:
+    """Of two cubes on one another and one beside them, 0.16 m above the floor as on it."""
+    found = []
+    for z in (0.01, 0.17):
+        run = make_run(cubes((0.05, 0.05, z), (0.07, 0.05, z), (0.07, 0.05, z + 0.02)))
+        change(run.folder, "bodies/release_time", data=np.array([1e9, 1e9, 1e9, 0.0, 1.0, 2.0]))
+        run = with_bed(run.folder, lambda x, y, z=z: 0 * x + z - 0.01)
+        found.append(pile_numbers.numbers(run, step=0.001).slopes)
+    assert found[0] == pytest.approx((45, 90, 90, 90), abs=3) and found[1] == found[0]
 
 
 def test_layer_and_porosity_on_a_slope(make_run) -> None:
@@ -172,6 +188,11 @@ def test_blocks_touch_and_cover_through_a_periodic_side(make_run, capsys) -> Non
     assert 0.0 < found.porosity < 1.0
     beside = make_run(cubes((0.295, 0.05, 0.01), (0.315, 0.05, 0.01), motion=periodic))
     assert placing.ends(beside)[:, 0] == pytest.approx([0.295, 0.315])  # not at both ends
+    change(beside.folder, "bodies/release_time", data=np.array([1e9, 1e9, 1e9, 0.0, 1.0]))
+    alone = pile_numbers.numbers(Run(beside.folder), 0.001)
+    assert (alone.centre[0], alone.spread[0]) == pytest.approx((0.005, 0.01))
+    assert alone.footprint == pytest.approx(0.04 * 0.02, rel=0.1)
+    assert Handover(Run(beside.folder), Options()).bodies[4].position[0] == pytest.approx(0.315)
 
 
 def test_contact_spheres_touch_where_they_are(make_run) -> None:
@@ -293,16 +314,16 @@ def test_slopes_of_a_roof() -> None:
     x = (np.arange(200) + 0.5) * STEP
     profile = np.minimum((x - 0.02) * np.tan(np.radians(30)), (0.12 - x))
     top = np.tile(np.where(profile > 0, 0.5 + profile, np.nan), (50, 1))
-    found = pile_form.slopes(top, 0.5, STEP)
+    found = pile_form.slopes(top - 0.5, STEP)
     assert found[:2] == pytest.approx((30, 45), abs=1e-9)
     assert np.isnan(found[2:]).all()
 
 
 def test_a_tower_is_upright_and_a_bare_floor_has_no_slope() -> None:
     top = np.full((50, 50), np.nan)
-    assert np.isnan(pile_form.slopes(top, 0.0, STEP)).all()
+    assert np.isnan(pile_form.slopes(top, STEP)).all()
     top[20:30, 20:30] = 0.04
-    assert pile_form.slopes(top, 0.0, STEP) == (90, 90, 90, 90)
+    assert pile_form.slopes(top, STEP) == (90, 90, 90, 90)
 
 
 @pytest.mark.parametrize(

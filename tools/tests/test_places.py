@@ -4,6 +4,7 @@ what people use; the layer of units against closed forms."""
 import csv
 import json
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
@@ -23,7 +24,7 @@ from micstools.reading.reader import Run
 from micstools.shapes import height_maps
 from micstools.shapes import shape as shapes
 from micstools.shapes.geometry import Array, quaternion_from_axis, quaternion_product
-from synthetic import UPRIGHT, Motion, with_bed, write_run
+from synthetic import UPRIGHT, Motion, change, with_bed, write_run
 from test_pile_ensemble import cube_run, write_ensemble
 
 EDGE, HALF = 0.02, 0.01
@@ -145,6 +146,9 @@ def test_the_status_says_what_is_there(tmp_path: Path) -> None:
     assert [p.at_rest for p in found] == [1] * 5 + [0] * 2
     told = run_page.page(Run(run.folder))
     assert "one block is still to come" in told and "one block is left out or out of" in told
+    change(run.folder, "bodies/status", data=np.array([2.0, 2, 2, 2, 2, 3, 2]))
+    told = run_page.page(Run(run.folder))
+    assert re.search(r"After [\d.]+ s three free blocks lie still, one block is left out", told)
 
 
 def test_share_within_a_tolerance(run: Run) -> None:
@@ -200,12 +204,13 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     assert list(table.columns) == list(places.MEANING)
     a2 = table[table.name == "A2"].iloc[0]
     assert (a2.x, a2.y, a2.z) == pytest.approx((354200.03, 5621080.03, -12.47), abs=1e-9)
-    assert a2.at_rest == 1 and a2.plan_x == pytest.approx(354200.15)
+    assert a2.at_rest == 1 and a2.plan_x == pytest.approx(354200.15, abs=1e-6)
 
     shown = geopandas.read_file(tmp_path / "places.geojson")
     assert shown.crs.to_epsg() == 25832
     unit = shown[(shown.kind == "unit") & (shown.name == "A2")].iloc[0]
-    assert (unit.geometry.x, unit.geometry.y, unit.geometry.z) == pytest.approx((a2.x, a2.y, a2.z))
+    here = unit.geometry.x, unit.geometry.y, unit.geometry.z
+    assert here == pytest.approx((a2.x, a2.y, a2.z), abs=1e-6)
     plan = shown[(shown.kind == "plan") & (shown.name == "A2")].iloc[0].geometry
     assert plan.area == pytest.approx(EDGE**2, rel=1e-4)
     assert plan.centroid.coords[0] == pytest.approx((a2.x, a2.y), abs=1e-6)
@@ -215,6 +220,9 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     drawing = ezdxf.readfile(tmp_path / "places.dxf")
     assert drawing.header.custom_vars.get("CRS") == "urn:ogc:def:crs:EPSG::25832"
     assert drawing.units == ezdxf.units.M
+    line = drawing.modelspace().query('LINE[layer=="DEVIATIONS"]')[1]
+    ends = line.dxf.start.x, line.dxf.end.x
+    assert ends == pytest.approx((354200.15, 354200.03), abs=1e-6)
     meshes = drawing.modelspace().query('MESH[layer=="UNITS"]')
     corners = np.array(meshes[4].vertices)
     assert corners.min(axis=0) == pytest.approx(np.array([a2.x, a2.y, a2.z]) - HALF, abs=1e-6)
@@ -406,12 +414,19 @@ def test_squares_as_fine_as_wanted(pack: Run) -> None:
 
 
 def test_a_bed_is_measured_by_the_ball_too(tmp_path: Path) -> None:
-    """The same pack on a slope of 1:2 is as thick; a ball rests higher on both."""
+    """The same pack on a bed is as thick; in steps down a slope of 1:2 less, as it is measured
+    across it; a ball rests higher on slope and pack."""
     run = cubes(tmp_path, two_layers(0.01))
     run = with_bed(run.folder, lambda x, y: 0 * x + 0.01)
     maps, found = layer.of_run(run, layers=2, area=CELL)  # type: ignore[misc]
     assert found.mean.coefficient == pytest.approx(1.10, rel=0.02)
     assert found.ball.thickness == pytest.approx(ball_thickness(), rel=0.02)
+    steps = cubes(tmp_path / "slope", [(x, y, z + 0.5 * x) for x, y, z in two_layers()])
+    steps = with_bed(steps.folder, lambda x, y: 0.5 * x)
+    found = layer.of_run(steps, layers=2, area=CELL)[1]  # type: ignore[index]
+    assert found.mean.coefficient == pytest.approx(1.10 / np.sqrt(1.25), rel=0.02)
+    assert found.area == pytest.approx(4 * PITCH**2 * np.sqrt(1.25))
+    assert found.packing == pytest.approx(100 * found.units / found.area)
     slope = np.tile(0.5 * EDGE / 24 * np.arange(200), (60, 1))
     rise = layer.on_ball(slope, EDGE / 24, RADIUS) - slope
     assert rise[20:40, 20:180] == pytest.approx(RADIUS * (np.sqrt(1.25) - 1), rel=0.05)

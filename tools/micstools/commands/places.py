@@ -121,8 +121,8 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options)
             head = f"{part.name}: " if part.name else ""
             print(head + ascii_of(places.share_words(within, part.units.length)))
         choice = part.choices[0]
-        all_places += [{"run": p.number} | choice | places.row_of(row)
-                       for p, one in zip(part.piles, each, strict=True) for row in one]  # fmt: skip
+        all_places += [{"run": n} | choice | places.row_of(row)
+                       for n, one in zip(part.runs, each, strict=True) for row in one]  # fmt: skip
         all_landings += [choice | handover.landing_row(one) for one in found]
         about.append({"choice": choice, "within": asdict(within) | {"share": within.share},
                       "landings": [asdict(one) for one in found]})  # fmt: skip

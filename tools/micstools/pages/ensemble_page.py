@@ -20,7 +20,7 @@ from micstools.piles.options import Options
 from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Pile
 from micstools.reading import health, places
 from micstools.reading.health import Check
-from micstools.reading.overlap import present_bodies
+from micstools.reading.overlap import present_bodies, without_machines
 from micstools.reading.places import Survey
 from micstools.reading.reader import Run
 from micstools.reading.shares import in_words
@@ -190,7 +190,7 @@ def _plan(ensemble: Ensemble, survey: Survey) -> Markup:
     found = [pile_ensemble.maps(part) for part in whole]
     top, length = max(float(maps.high.max()) for maps in found), ensemble.units.length
     run, area = ensemble.example.run, ensemble.area
-    areas = [placing.drop_area([p.run for p in ensemble.piles]), *([area] if area.given else [])]
+    areas = [placing.drop_area(list(ensemble.runs.values())), *([area] if area.given else [])]
     note = f"Of the {len(ensemble.whole)} piles with all their blocks, fixed blocks included. "
     note += "Dashed: where blocks are let go, half a block wider."
     note += " Solid line: the wanted area." if area.given else ""
@@ -241,7 +241,8 @@ def _landings(ensemble: Ensemble, told: Options) -> Markup:
         columns = heads if plan else heads[:-1]
         parts += [tag("p", ": ".join(said)), table(columns, rows)]
     note = f"The ellipse holds {100 * places.ELLIPSE:.0f} % of normally distributed landings with "
-    note += "the same mean and covariance; headings go from +y towards +x. In brackets: share and "
+    way = "north towards east" if told.north else "+y towards +x"
+    note += f"the same mean and covariance; headings go from {way}. In brackets: share and "
     note += "its 95 % interval."
     return section("landings", "Where each unit lands", *parts, tag("p", note, class_="note"))
 
@@ -467,7 +468,8 @@ def _table(ensemble: Ensemble) -> Markup:
             p.number,
             *(str(p.row.get(name, "")) for name in varied),
             *([p.pattern] if patterns else []),
-            f"{p.numbers.blocks} of {p.run.bodies.n}",
+            f"{p.numbers.blocks} of "
+            f"{len(without_machines(p.run, dict(enumerate(p.run.bodies.name))))}",
             number(100 * ensemble.area.share_outside(placing.ends(p.run)), ".0f"),
             *(shown.of_kind(q.kind).figure(q.value(p)) for q in _QUANTITIES),
         ]

@@ -26,10 +26,10 @@ from micstools.piles import drawing, layer, maps, pile, pile_numbers
 from micstools.piles.handover import Handover
 from micstools.piles.options import Options
 from micstools.piles.pile_numbers import PileNumbers
-from micstools.reading import block_numbers, health, places, scales, units
+from micstools.reading import block_numbers, health, places, rest, scales, units
 from micstools.reading.block_numbers import BlockNumbers
 from micstools.reading.health import Check
-from micstools.reading.overlap import present_bodies
+from micstools.reading.overlap import present_bodies, without_machines
 from micstools.reading.places import Within
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import SI, Units, figure
@@ -95,9 +95,10 @@ def page(run: Run, told: Options = Options()) -> str:  # noqa: B008 (it is froze
 def outcome(run: Run, found: Found) -> str:
     """How the run ended, in a sentence or two."""
     b = run.bodies
-    n, end = len(found.blocks), f"After {figure(float(b.time[-1]))} s "
+    rests, end = rest.of_blocks(run), f"After {figure(float(b.time[-1]))} s "
+    n = len(rests)
     missing = int((b.to_come(-1) & ~b.fixed).sum())
-    moving = sum(k.at_rest != k.at_rest for k in found.blocks)
+    moving = sum(k.time != k.time for k in rests)
     if missing:
         said = f"{end}{count(missing, 'block is', 'blocks are')} still to come and "
         said += f"{count(n, 'block was', 'blocks were')} let go"
@@ -129,7 +130,7 @@ def _facts(run: Run, found: Found) -> Markup:
     n, b, shown = found.numbers, run.bodies, found.units
     hardest = max(found.blocks, key=lambda k: np.nan_to_num(k.contact_force), default=None)
     blow = f"block {hardest.block}, mean of a step" if hardest else ""
-    mass = float(b.mass[b.present(-1)].sum())
+    mass = float(b.mass[list(without_machines(run, present_bodies(run, -1)))].sum())
     return facts(
         [
             ("blocks", n.blocks, f"{shown.mass.text(mass)} in all"),

@@ -79,9 +79,11 @@ class Handover:
 
     @property
     def bodies(self) -> dict[int, Placed]:
-        """The released bodies by their number from 0."""
+        """The released bodies by their number from 0; a way through a period goes on."""
         units, others = parted(self.run)
-        return dict(sorted((units | others).items()))
+        ends = places.ends(self.run)
+        found = {k: b.moved(ends[k] - b.position) for k, b in (units | others).items()}
+        return dict(sorted(found.items()))
 
     def hull(self, body: Placed) -> Array:
         """The smallest convex plan that holds a body: a closed line (k, 2) [m]."""

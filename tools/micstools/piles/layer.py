@@ -6,12 +6,14 @@ packing, in two ways.
 - `mean`: the mean height of what is seen from above, of the bed in the gaps.
 
 Definitions (The Rock Manual, CIRIA C683, 3.4.4): k_t = t/(n D_n), n_v = 1 - V/(A t),
-N/A = n k_t (1 - n_v)/D_n^2, with the thickness t, the number of layers n and the volume V of the N
-units over the area A. One follows from the others, so both ways give one packing.
+N/A = n k_t (1 - n_v)/D_n^2, with the number of layers n, the area A along the slope of the bed, the
+thickness t across it and the volume V of the N units. Both ways give one packing.
 """
 
+import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,18 +36,8 @@ THIN = 0.01
 MOST_SQUARES = 4_000_000
 """Of a map; a larger layer has coarser ones."""
 
-DEFINITIONS = {
-    "nominal_diameter": "D_n: edge of a cube with the volume of the unit at half of the mass [m]",
-    "area": "A: that was given, else where the ball stands above the bed [m2]",
-    "units": "N: volume of the units over A in volumes of a unit",
-    "layers": "n: that was given, else the thickness by the ball in D_n, rounded",
-    "packing": "N/A, units per 100 m2",
-    "packing_density": "N/A D_n^2 = n k_t (1 - n_v)",
-    "thickness": "t: mean over A of the height over the bed; ball: of the surface on which a ball "
-    "of the diameter D_n/2 rests; mean: of what is seen from above, 0 in gaps [m]",
-    "coefficient": "k_t = t/(n D_n)",
-    "porosity": "n_v = 1 - V/(A t), V: volume of the units over A",
-}
+_MEANINGS = tomllib.loads((Path(__file__).parents[1] / "meanings.toml").read_text())
+DEFINITIONS: dict[str, str] = _MEANINGS["layer"]
 """What the numbers of a layer mean."""
 
 
@@ -84,6 +76,7 @@ class Maps:
     ball: Array  # on which the ball rests
     covered: NDArray[np.bool_]  # by a unit, seen from above
     raised: NDArray[np.bool_]  # where the ball stands above the bed
+    lean: Array  # area along the bed over that of the plan
 
     def outlines(self) -> dict[str, list[Array]]:
         """Closed lines (k, 2) [m] around the layer: by the ball, and around what is covered."""
@@ -129,6 +122,17 @@ def on_ball(heights: Array, step: float, radius: float) -> Array:
     return found
 
 
+def lean(bed: Array, step: float, width: float) -> Array:
+    """Area along a bed (ny, nx) [m] over that of the plan, on squares of `step` [m]: by the slope
+    of the mean heights of parts about a `width` [m] wide."""
+    parts = [np.array_split(np.arange(n), max(2, round(n * step / width))) for n in bed.shape]
+    means = np.array([[bed[np.ix_(y, x)].mean() for x in parts[1]] for y in parts[0]])
+    middles = [[step * part.mean() for part in along] for along in parts]
+    found = np.hypot(1, np.hypot(*np.gradient(means, *middles)))
+    y, x = (np.repeat(np.arange(len(along)), [len(part) for part in along]) for along in parts)
+    return np.asarray(found[np.ix_(y, x)])
+
+
 def maps(run: Run, diameter: float, row: int = -1, step: float | None = None,
          area: Corners | None = None) -> Maps:  # fmt: skip
     """The surfaces around the units of a run, and over an `area`, on squares of `step` [m], by
@@ -143,14 +147,14 @@ def maps(run: Run, diameter: float, row: int = -1, step: float | None = None,
     least = float(np.sqrt(np.prod((high - low)[:2]) / MOST_SQUARES))
     step = step or max(diameter / FINE, least)
     top = height_map(blocks, low, high, step)
-    bed = ground_map(run, low, high, step)
+    ground = ground_map(run, low, high, step)
     held = height_map(images(run, others.values()), low, high, step)
-    bed = np.fmax(bed, held)
+    bed = np.fmax(ground, held)
     seen, radius = np.fmax(top, bed), BALL * diameter / 2
     ball, bed_ball = on_ball(seen, step, radius), on_ball(bed, step, radius)
     covered = np.isfinite(top) & (top > bed)
     return Maps(low[:2], step, bed, bed_ball, seen, ball, covered,
-                ball > bed_ball + THIN * diameter)  # fmt: skip
+                ball > bed_ball + THIN * diameter, lean(ground, step, 2 * diameter))  # fmt: skip
 
 
 def layer(run: Run, found: Maps, diameter: float, row: int = -1, layers: int | None = None,
@@ -175,8 +179,10 @@ def layer(run: Run, found: Maps, diameter: float, row: int = -1, layers: int | N
         volumes = [volume_in_box(body.tets, low, high) for body in shown]
         shares = [v / b.shape.volume for v, b in zip(volumes, shown, strict=True)]
         count = float(sum(shares))
+    along = found.lean[inside].mean() if inside.any() else 1.0
+    size *= along
     thick = [
-        float(np.sum((one - other)[inside])) / max(1, int(inside.sum()))
+        float(np.sum((one - other)[inside])) / max(1, int(inside.sum())) / along
         for one, other in ((found.ball, found.bed_ball), (found.seen, found.bed))
     ]
     n = layers or max(1, round(thick[0] / diameter))

@@ -75,20 +75,28 @@ class Ensemble:
     folder: Path
     about: dict[str, Any]  # what ensemble.json says
     piles: list[Pile]
+    emptied: list[tuple[dict[str, Any], Run]]  # rows and runs whose blocks have all left the tank
     step: float  # of the maps [m]
-    left_out: dict[int, str]  # runs without an outcome, and what they are instead
+    left_out: dict[int, str]  # runs without a pile, and what they are instead
     area: Area  # of the plan, in which blocks should lie
 
     @property
     def placing(self) -> Placing | None:
         """Where the released free blocks of all runs lie."""
-        return placing([p.run for p in self.piles], self.area)
+        return placing(list(self.runs.values()), self.area)
+
+    @property
+    def runs(self) -> dict[int, Run]:
+        """By their number those with a free block that was released, if none is left, too."""
+        return {p.number: p.run for p in self.piles} | {
+            int(r["run"]): run for r, run in self.emptied
+        }
 
     @property
     def left_words(self) -> str:
-        """What no number counts, and why; empty where there is nothing."""
+        """What no pile counts, and why; empty where there is nothing."""
         names = ", ".join(f"{k} ({v})" for k, v in self.left_out.items())
-        return names and f"left out for want of an outcome: runs {names}"
+        return names and f"left out for want of a pile: runs {names}"
 
     @property
     def has_patterns(self) -> bool:
@@ -117,19 +125,19 @@ class Ensemble:
         found: list[dict[str, Any]] = self.about["choices"]
         return found
 
-    def of(self, choice: dict[str, Any]) -> list[Pile]:
-        """The piles of a choice."""
-        return [p for p in self.piles if all(p.row[k] == v for k, v in choice.items())]
+    def of(self, choice: dict[str, Any]) -> "Ensemble":
+        """That of a choice."""
+        piles = [p for p in self.piles if choice.items() <= p.row.items()]
+        emptied = [(row, run) for row, run in self.emptied if choice.items() <= row.items()]
+        about = self.about | {"choices": [choice]}
+        return replace(self, about=about, piles=piles, emptied=emptied)
 
     @property
     def parts(self) -> list["Ensemble"]:
         """An ensemble of each choice: the runs of different choices have the same drops, so they
         are not independent, and numbers over all of them tell nothing."""
-        return [
-            replace(self, about=self.about | {"choices": [choice]}, piles=self.of(choice))
-            for choice in self.choices
-            if self.of(choice)  # of others no run has come to its end
-        ]
+        parts = map(self.of, self.choices)
+        return [part for part in parts if part.piles]  # of others no run has come to its end
 
     @property
     def name(self) -> str:
@@ -172,16 +180,19 @@ def open_ensemble(
         raise BadRun(f"{folder} holds no run that came to its end")
     if step is None:
         step = usual_step(Run(folder / str(done[0]["folder"]) / "result"))
-    piles = []
+    piles, emptied = [], []
     for row in done:
         run = Run(folder / str(row["folder"]) / "result")
         if parted(run)[0]:
             piles.append(_pile(run, row, step, box, told))
-        else:
-            left[int(row["run"])] = "no block in the tank"
+            continue
+        gone = bool((run.bodies.status == 4).any())
+        left[int(row["run"])] = "all blocks out of the tank" if gone else "no block in the tank"
+        emptied += [(row, run)] if gone else []
     if not piles:
         raise BadRun(f"{folder} holds no run with a block in the tank at its end")
-    return Ensemble(folder, said, piles, step, left, area or drop_area([p.run for p in piles]))
+    area = area or drop_area([p.run for p in piles] + [run for _, run in emptied])
+    return Ensemble(folder, said, piles, emptied, step, left, area)
 
 
 def about(path: Path) -> dict[str, Any]:
@@ -234,7 +245,7 @@ def places_of(part: Ensemble, survey: Survey = Survey(),  # noqa: B008 (it is fr
     """The places of each run of a choice, and the tolerance [m], by default that of `places`."""
     bodies, _ = parted(part.example.run)
     wanted = tolerance or TOLERANCE * nominal_diameter(bodies.values())
-    return [places(p.run, survey) for p in part.piles], wanted
+    return [places(run, survey) for run in part.runs.values()], wanted
 
 
 def maps(ensemble: Ensemble) -> Maps:

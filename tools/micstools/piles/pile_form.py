@@ -85,11 +85,11 @@ def outline(top: Array, low: Array, step: float) -> list[Array]:
     return [low[:2] + (np.asarray(line, float) - 0.5) * step for line in found]
 
 
-def slopes(top: Array, floor: float, step: float) -> tuple[float, float, float, float]:
-    """Angles [degrees] of the sides of a pile towards -x, +x, -y, +y, from its height map (ny, nx)
-    [m]: of the line through the outermost squares that reach 90 % and 10 % of the height, seen
-    from the side. 90: upright; nan: the pile lies against the end of the map."""
-    height = np.nan_to_num(top - floor, nan=0.0)
+def slopes(height: Array, step: float) -> tuple[float, float, float, float]:
+    """Angles [degrees] of the sides of a pile towards -x, +x, -y, +y, from a map (ny, nx) of its
+    height above the ground [m]: of the line through the outermost squares that reach 90 % and 10 %
+    of it, seen from the side. 90: upright; nan: the pile lies against the end of the map."""
+    height = np.nan_to_num(height, nan=0.0)
     along_x, along_y = height.max(axis=0), height.max(axis=1)
     left, right, front, back = (
         _slope(profile, step) for profile in (along_x, along_x[::-1], along_y, along_y[::-1])

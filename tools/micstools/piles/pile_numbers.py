@@ -33,7 +33,7 @@ class PileNumbers:
     terminal_speed: float  # its speed once that has settled; nan of a short fall [m/s]
     fall_drift: float  # its way until then, seen from above [m]
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
-    contact_force: float  # largest on a dropped block, a mean over a step [N]
+    contact_force: float  # largest on a free block, a mean over a step [N]
     peak_force: float  # the same within a step: an impact's impulse over contact_time [N]
     slopes: tuple[float, float, float, float]  # of the sides towards -x, +x, -y, +y [degrees]
     attitude_randomness: float  # of the free blocks of the commonest shape; 0 alike, 1 random
@@ -101,10 +101,17 @@ def numbers(
     top = height_map(blocks, run.grid.low, run.grid.high, step)
     here = list(bodies)
     mass, place = b.mass[here], np.array([body.position for body in bodies.values()])
-    x, y, z = (float(v) for v in (mass[:, None] * place).sum(axis=0) / mass.sum())
+    # Through periodic sides, around the middle of all
+    period = np.where(run.period > 0, run.period, np.inf)
+    turn = 2 * np.pi * place / period
+    middle = run.period / (2 * np.pi) * np.arctan2(mass @ np.sin(turn), mass @ np.cos(turn))
+    place -= run.period * np.round((place - middle) / period)
+    x, y, z = (float(v) for v in run.into_tank(mass @ place / mass.sum()))
+    away = np.where(run.period > 0, (run.grid.low + run.grid.high) / 2 - middle, 0) / step
     low, high = box or pile_form.around(blocks, run.grid.low, run.grid.high)
     ground = ground_map(run, run.grid.low, run.grid.high, step)
     thickness, height = pile_form.layer(top, ground)
+    top, ground = (np.roll(m, away[1::-1].round().astype(int), (0, 1)) for m in (top, ground))
     highest = max(float(body.points[:, 2].max()) for body in blocks)
     if not len(run.bed[1]):
         height = highest - float(run.grid.low[2])  # exact
@@ -119,7 +126,7 @@ def numbers(
         on_floor=sum(seen.on_floor(int(k)) for k in b.dropped),
         plan_area=area,
         top=highest,
-        coordination=2 * len(seen.blocks) / len(bodies),
+        coordination=2 * sum(bodies.keys() >= {*pair} for pair in seen.blocks) / len(bodies),
         centre=(x, y, z),
         spread=(float(place[:, 0].std()), float(place[:, 1].std())),
         time_to_rest=time_to_rest(run),
@@ -130,7 +137,7 @@ def numbers(
         impact_speed=impact_speed(run),
         contact_force=max((k.contact_force for k in struck), default=float("nan")),
         peak_force=max((k.peak_force for k in struck), default=float("nan")),
-        slopes=pile_form.slopes(top, float(run.grid.low[2]), step),
+        slopes=pile_form.slopes(top - ground, step),
         attitude_randomness=_randomness(run, row),
         porosity=pile_form.porosity(blocks, low, high, bed_volume(run, low, high, step)),
         box=tuple(float(v) for v in (*low, *high)),
@@ -158,8 +165,7 @@ def _randomness(run: Run, row: int) -> float:
 
 def time_to_rest(run: Run) -> float:
     """Time [s] after which every free block stays; nan where one moves or is still to come."""
-    b = run.bodies
-    if not b.released(-1).all():
+    if run.bodies.to_come(-1).any():
         return float("nan")
     times = [found.time for found in rest.of_blocks(run)]
     return float(np.max(times, initial=0.0))

@@ -8,6 +8,7 @@ these do. All lengths in metres.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,7 @@ def present_bodies(run: Run, row: int) -> dict[int, Placed]:
     }
 
 
-def without_machines(run: Run, bodies: dict[int, Placed]) -> dict[int, Placed]:
+def without_machines(run: Run, bodies: dict[int, Any]) -> dict[int, Any]:
     """Bodies without those that a table moves: doors, pushers, paddles. They are no part of a pile,
     nor of the ground."""
     groups = run.parameters.get("body", [])

@@ -2,8 +2,10 @@
 runs of an ensemble the ellipse in which a unit lands, and the share within a tolerance."""
 
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -66,28 +68,8 @@ class Place:
     exit_time: float
 
 
-MEANING = {
-    "unit": "number, from 1",
-    "name": "of the plan",
-    "x": "easting of the centroid at the end [m]",
-    "y": "northing [m]",
-    "z": "level [m]",
-    "heading_deg": "direction of its x axis, from north towards east, with the tilt taken back; an "
-    "unturned unit heads along +x, east: 90",
-    "tilt_deg": "angle of its z axis from the vertical",
-    "deviation": "distance of x, y from plan_x, plan_y [m]",
-    "at_rest": "1: it stays where it is; 0: it moves, is out of the tank, or was not released",
-    "neighbours": "units that it touches",
-    "contacts": "all that it touches: units, walls, floor or bed",
-    "shape": "name of its shape",
-    "fixed": "1: it is held",
-    "time": "of its release [s]",
-    "plan_x": "easting of its place in the plan, without the random shift by spread [m]",
-    "plan_y": "northing [m]",
-    "plan_z": "level at its release [m]",
-    "touching": "numbers of the units that it touches",
-    "exit_time": "when it passed an open side and was taken out of the tank [s]",
-}
+_MEANINGS = tomllib.loads((Path(__file__).parents[1] / "meanings.toml").read_text())
+MEANING: dict[str, str] = _MEANINGS["place"]
 """The columns of a table of places."""
 
 
@@ -123,13 +105,18 @@ def planned(run: Run) -> Array:
     return np.where(released[:, None], start, np.nan)
 
 
+def ends(run: Run) -> Array:
+    """Place (N, 3) of each body at the end [m]; a way through a period goes on."""
+    plan = planned(run)
+    return np.asarray(run.into_tank(plan) + run.bodies.position[-1] - plan)
+
+
 def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (it is frozen)
     """Every unit at the end of a run, in the order of their numbers."""
     b, plan = run.bodies, planned(run)
     seen = find_contacts(run, len(b.time) - 1)
     present, shown = b.present(-1), survey.of(run.into_tank(plan))
-    ends = run.into_tank(plan) + b.position[-1] - plan  # a way through a period goes on
-    level = np.where(present[:, None], survey.of(ends), math.nan)
+    level = np.where(present[:, None], survey.of(ends(run)), math.nan)
     away = np.linalg.norm((b.position[-1] - plan)[:, :2], axis=1)
     found = []
     for k, here in enumerate(present):
@@ -138,27 +125,18 @@ def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (i
         stays = here and (b.fixed[k] or not math.isnan(rest.of_block(run, k).time))
         found.append(
             Place(
-                unit=k + 1,
-                name=b.name[k],
-                x=float(level[k, 0]),
-                y=float(level[k, 1]),
-                z=float(level[k, 2]),
-                heading_deg=heading if here else math.nan,
-                tilt_deg=tilt if here else math.nan,
-                deviation=float(away[k]),
-                at_rest=int(stays),
-                neighbours=len(beside),
+                unit=k + 1, name=b.name[k],
+                x=float(level[k, 0]), y=float(level[k, 1]), z=float(level[k, 2]),
+                heading_deg=heading if here else math.nan, tilt_deg=tilt if here else math.nan,
+                deviation=float(away[k]), at_rest=int(stays), neighbours=len(beside),
                 contacts=len(beside) + len(seen.walls_of(k)) + (k in seen.bed),
-                shape=b.shape[k],
-                fixed=int(b.fixed[k]),
+                shape=b.shape[k], fixed=int(b.fixed[k]),
                 time=float(b.release_time[k]) if np.isfinite(plan[k, 0]) else math.nan,
-                plan_x=float(shown[k, 0]),
-                plan_y=float(shown[k, 1]),
-                plan_z=float(shown[k, 2]),
+                plan_x=float(shown[k, 0]), plan_y=float(shown[k, 1]), plan_z=float(shown[k, 2]),
                 touching=" ".join(str(j + 1) for j in beside),
                 exit_time=float(b.exit_time[k]) if np.isfinite(b.exit_time[k]) else math.nan,
             )
-        )
+        )  # fmt: skip
     return found
 
 
