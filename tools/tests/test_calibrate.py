@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calls import MICS, mics_tools, needs_mics
@@ -43,6 +44,15 @@ def test_finds_what_is_known(
     assert "drag_coefficient = 0." in capsys.readouterr().out
 
 
+def test_errors_of_a_faster_fall() -> None:
+    t = np.linspace(0, 1, 9)
+    one, fast = (Fall(t / k, 10 * t, np.full(9, 10.0 * k)) for k in (1.0, 1.1))
+    found = calibrate.errors(fast, one, 1.0)
+    assert (found.speed, found.time, found.impact) == pytest.approx((0.1, -1 / 11, 0.1))
+
+
 def test_a_shape_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(BadRun, match="no such &shape; it has: other, unit"):
         Calibration(MICS, CASE, "block", tmp_path / "out")
+    with pytest.raises(BadRun, match="cannot be read: a repeat count must be 1 to 1000"):
+        Calibration(MICS, CASE + "&drop a = 999999999*0.1 /", "unit", tmp_path / "out")

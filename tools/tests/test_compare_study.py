@@ -10,8 +10,9 @@ import pytest
 
 from calls import mics_tools, stand_in
 from micstools.cases.convergence import converge
+from micstools.commands import study
 from micstools.commands.study import finer
-from micstools.reading import comparison
+from micstools.reading import comparison, units
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import quaternion_from_axis
 from synthetic import UPRIGHT, Motion, change, reword, write_run
@@ -87,9 +88,15 @@ def test_equal_numbers_are_converged(words: str) -> None:
         assert (found.limit, found.error) == (values[-1], 0.0), values
 
 
+def test_the_error_of_a_place_is_no_place() -> None:
+    told = converge((1, 2, 4), [2 + 0.064 / n**2 for n in (1, 2, 4)])
+    assert study._words(told, units.SITE.place) == "order 2.00, limit 2\u00a0m, error +0.004\u00a0m"
+
+
 def test_cells_are_refined() -> None:
     text = "&grid cells = 10, 1, 21 length = 1, 1, 1 / ! a slice\n"
-    assert "cells = 15, 1, 32" in finer(text, 1.5)
+    found, fine = finer(text, 1.5)
+    assert "cells = 15, 1, 32" in found and fine == pytest.approx((1.5 * 32 / 21) ** 0.5)
     for none in ("30", "'a'", "30, 'a', 4"):
         with pytest.raises(BadRun, match="no &grid cells = nx, ny, nz"):
             finer(f"&grid cells = {none} /\n", 2.0)
@@ -132,8 +139,9 @@ def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
     assert call(capfd, *words, "--cells", "1,1.5,2")[1].count("\nran ") == 0
     code, out, _ = call(capfd, *words, "--cells", "1,1.5,2,3")
     assert out.count("\nran 30") == 1
-    code, _, err = call(capfd, *words, "--cells", "1,999.9")
-    assert code == 2 and "too many" in err
+    for cells, why in (("1,999.9", "too many"), ("1,1.01", "the same cells")):
+        code, _, err = call(capfd, *words, "--cells", cells)
+        assert code == 2 and why in err
 
 
 def test_a_grid_that_broke_down_is_left_out(tmp_path: Path, capfd) -> None:

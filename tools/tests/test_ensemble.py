@@ -106,6 +106,10 @@ def test_other_runs_and_strange_folders_are_left_alone(
     assert "is in use by process" in capsys.readouterr().err
     (tmp_path / "case.nml").write_text(CASE.replace("spread = 0.1, 0.1, 0.0", ""))
     assert call(program, "--tilt", "5", *words, str(tmp_path / "out")) == 0
+    for value, code, said in (("0,4,0,6", 2, "a value stands twice"), ("0,4", 0, "2 values")):
+        vary = ("--tilt", "5", "--vary", f"contact.friction={value}")
+        assert call(program, *vary, *words, str(tmp_path / value)) == code
+        assert said in capsys.readouterr().err
 
 
 def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:

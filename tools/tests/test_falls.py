@@ -100,6 +100,14 @@ def test_falls_are_predicted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     said = told(f"{CUBE} 2, 2, 3 /", sides="z_min = 'open'")
     assert "lowest point at 2.5 m, 0.5 m above the water; water 2 m deep there, 20 cells" in said
     assert "if no block is in its way" not in said and "a long fall" in said
+    end = "a long fall in water ends at about"
+    said = told(f"{CUBE} 2, 2, 3 /", run="physics = 'light'")
+    light = (2 * (2300 / 998.2 - 1) * G / (0.55 * 2)) ** 0.5
+    assert speed(said, end) == pytest.approx(light, rel=0.02)
+    said = told(
+        "&body shape = 'ball'  position = 2, 2, 3 /", "water_level = 2 liquid_density = 250"
+    )
+    assert speed(said, end) == pytest.approx((4 / 3 * G / 0.42) ** 0.5, rel=0.02)
     said = told(f"{CUBE} 2, 2, 3 /", "gravity = 1, 0, -9  water_level = 2")
     assert "lowest point 2.5 m" in said and "m/s" not in said
     assert told("&body shape = 'cube' position = 2,2,2 fixed = T /") == ""

@@ -6,7 +6,7 @@ import pytest
 
 from micstools.shapes import geometry as g
 from micstools.shapes.geometry import tet_volumes
-from micstools.shapes.shape import box, hexapod
+from micstools.shapes.shape import box, from_tets, hexapod
 
 TILTED = g.quaternion_from_axis(np.array([0.3, -0.5, 0.8]), 37.0)
 
@@ -147,3 +147,9 @@ def test_feature_edges_of_a_hexapod() -> None:
     shape = hexapod(0.02, 2)
     length = np.linalg.norm(np.diff(shape.points[shape.edges], axis=1), axis=2).sum()
     assert length == pytest.approx(60 * 0.02, rel=1e-12)
+
+
+def test_inertia_turns_with_the_body() -> None:
+    brick, turn = box((0.03, 0.02, 0.05), density=1000.0), g.rotation_matrix(TILTED)
+    turned = from_tets("b", brick.points[brick.tets] @ turn.T, 1000.0)
+    assert turned.inertia == pytest.approx(turn @ brick.inertia @ turn.T, rel=1e-9, abs=1e-15)

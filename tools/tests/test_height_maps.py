@@ -270,6 +270,8 @@ def test_lost_points_and_unknown_systems_are_told(tmp_path: Path, capsys) -> Non
     assert mics_tools(["bed", str(path), "--out", str(tmp_path / "bed.txt")]) == 0
     told = capsys.readouterr()
     assert "note      remarks look like points, 2 in all, the first on line 2" in told.out
+    numbered = save(tmp_path / "b.csv", "ID;x;y;z\na;0;0;1\n b;1;0;1\nc;0;1;1\nd;1;1;1\n#5;2;0;1")
+    assert "1 in all, the first on line 6" in height_maps.load(numbered).remarks[0]
     assert "coordinates of a survey, whose system the file does not tell" in told.err
     with in_system(tmp_path / "a.tif", 25832, 354200, 5621080) as raster:
         raster.write(Z.astype(np.float32), 1)

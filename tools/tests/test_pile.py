@@ -1,6 +1,8 @@
 """The findings on piles whose truth is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import h5py
 import numpy as np
@@ -112,6 +114,9 @@ def test_telling_times_are_written_times(loose_pile) -> None:
     assert set(times) <= set(loose_pile.field_times)
     assert times[-1] == 8.0
     assert {0.0, 0.5, 1.5, 2.5, 3.5, 4.5} <= set(times)
+    many = SimpleNamespace(release_time=0.2 * np.arange(41), dropped=np.arange(40), time=[0.0, 8.0])
+    run: Any = SimpleNamespace(bodies=many, field_times=np.linspace(0, 8, 81))
+    assert 10 < len(pile.telling_times(run)) <= pile.PICTURES
 
 
 def test_the_paper_is_spoken_of_in_its_own_tank_only(make_run, loose_pile) -> None:

@@ -17,6 +17,7 @@ import f90nml
 import h5py
 import numpy as np
 
+from micstools.reading import namelist
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import Array
 
@@ -107,7 +108,10 @@ class Calibration:
     def __init__(self, mics: Path, text: str, shape: str, folder: Path, threads: int = 1) -> None:
         """Find the size of the shape of a case; nothing has fallen yet."""
         self.mics, self.folder, self.threads, self.shape = mics, folder, threads, shape
-        self.case = f90nml.reads(text)
+        try:
+            self.case = namelist.read(text)
+        except ValueError as error:
+            raise BadRun(f"the case cannot be read: {error}") from error
         folder.mkdir(parents=True, exist_ok=True)
         self.length = 1.0
         self.length = self._extent()

@@ -36,12 +36,15 @@ def _plan(given: argparse.Namespace) -> Plan:
             raise BadRun(f"{word}: the seeds of all runs are drawn from --seed")
     text = program.case_text(given.case, given.settings)
     choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
+    if any(choices.count(choice) > 1 for choice in choices):
+        raise BadRun(f"--vary {' '.join(given.vary)}: a value stands twice (a decimal has a point)")
     loads = tuple(str(load) for path in given.start for load in _loads(path))
     if not (runs := given.runs or len(loads)):
         raise BadRun("--runs: how many? (with --start by default one for each load)")
     for word in given.vary:
-        if re.fullmatch(r"[^=]+=\s*[+-]?\d+,\d+\s*", word):
-            print(f"--vary {word}: two values (a decimal has a point)", file=sys.stderr)
+        if re.fullmatch(r"[^=]+=\s*[+-]?\d+(,[+-]?\d+)+\s*", word):
+            many = word.count(",") + 1
+            print(f"--vary {word}: {many} values (a decimal has a point)", file=sys.stderr)
     folder = given.out or Path(f"mics-ensemble-{given.case.stem}")
     return Plan(text, folder, runs, given.seed, given.spread, given.tilt, choices, loads)
 

@@ -4,7 +4,7 @@ import argparse
 import json
 import subprocess
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +20,16 @@ from micstools.reading.units import Unit, Units, ascii_of
 _ENDED = (0, 3)  # codes of a run that would end in the same way again
 
 
-def finer(text: str, factor: float) -> str:
-    """The case with `factor` times its cells in each direction that has more than one."""
+def finer(text: str, factor: float) -> tuple[str, float]:
+    """The case with `factor` times its cells in each direction that has more than one, and how many
+    times that is on average, as counts are whole."""
     cells = settings.value(text, "grid", "cells")
     if not isinstance(cells, list) or not all(isinstance(n, int) for n in cells):
         raise BadRun("the case has no &grid cells = nx, ny, nz: there is nothing to refine")
     wanted = [n if n == 1 else max(1, round(factor * n)) for n in cells]
-    return settings.set_group(text, "grid", {"cells": wanted})
+    ratios = [new / n for new, n in zip(wanted, cells, strict=True) if n > 1]
+    text = settings.set_group(text, "grid", {"cells": wanted})
+    return text, float(np.prod(ratios)) ** (1 / max(1, len(ratios)))
 
 
 def _run(path: Path, text: str, folder: Path, threads: int | None) -> Run:
@@ -60,17 +63,19 @@ def work(given: argparse.Namespace) -> int:
     path = program.find(given.program, given.case)
     folder = given.out or Path(f"mics-study-{given.case.stem}")
     cases = [finer(text, factor) for factor in factors]
-    for each in cases:
+    for each, _ in cases:
         program.check(path, each)
+    if len({fine for _, fine in cases}) < len(cases):
+        raise BadRun(f"--cells {given.cells}: two of them are the same cells")
     whole, found = [], []
-    for factor, each in zip(factors, cases, strict=True):
+    for factor, (each, fine) in zip(factors, cases, strict=True):
         print(f"cells x {factor:g}: {folder}/{factor:g}", flush=True)
         run = _run(path, each, folder / f"{factor:g}", given.threads)
         if _code(run.folder) != 0:
             print(f"mics-tools study: {run.folder} ended with code 3, a fault of the numerics or "
                   "blocks without room: left out", file=sys.stderr)  # fmt: skip
             continue
-        whole.append(factor)
+        whole.append(fine)
         found.append(pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run))))
     if found:
         _tell(folder, whole, found, units.of_run(run))
@@ -98,9 +103,10 @@ def _tell(
 
 
 def _words(told: Convergence, unit: Unit) -> str:
+    change = replace(unit, decimals=None)  # of a place, is none
     if told.words:
-        found = f", range {unit.text(told.range, 2)}" if told.range == told.range else ""
+        found = f", range {change.text(told.range, 2)}" if told.range == told.range else ""
         return f"({told.words}{found})"
-    limit, error = unit.text(told.limit, 5), unit.text(told.error, 2)
+    limit, error = unit.text(told.limit, 5), change.text(told.error, 2)
     sign = "+" if told.error > 0 else ""
     return f"order {told.order:.2f}, limit {limit}, error {sign}{error}"

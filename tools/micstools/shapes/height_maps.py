@@ -298,8 +298,9 @@ def _points(path: Path, grid: float | None, marks: Sequence[float], unit: str | 
     said = re.findall(rf"(?i)#.*?\b({_SUFFIX})\b", "\n".join(text[:20]))
     if said and not unit and (factors == 1).all() and metres(path, said[0]) != 1:
         remarks += (f"a remark speaks of {said[0]}; taken in m, --unit tells another one",)
-    numbers = r"[-+\d.]+([\s,;]+[-+\d.]+){2}\s*"
-    lost = [n for n, line in enumerate(text, 1) if re.fullmatch(r"\s*#\s*" + numbers, line)]
+    behind = [(n, re.split(r"[\s,;]+", line.strip("# \t,;"))) for n, line in enumerate(text, 1)
+              if line.lstrip()[:1] == "#"]  # fmt: skip
+    lost = [n for n, row in behind if len(row) == wide and all(_is_number(row[k]) for k in xyz)]
     if lost:
         remarks += (f"remarks look like points, {len(lost)} in all, the first on line {lost[0]}",)
     if grid is None:
