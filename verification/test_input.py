@@ -156,6 +156,7 @@ def bodies_apart(count: int) -> str:
 
 
 LARGE = {
+    "remarks": (lambda n: TANK + n * "! a remark\n", 900_000, "Memory"),
     "bodies": (bodies_apart, 20000, "free                    {count}"),
     "long title": (lambda n: TANK.replace("= 1 /", f"= 1  title = '{n * 'a'}' /"), 10**6, "Memory"),
     "groups": (
@@ -183,6 +184,7 @@ def test_time_to_read_grows_with_length(name: str, tmp_path: Path) -> None:
         return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
     assert seconds(largest) < 8 * max(seconds(largest // 4), 0.05)
+    assert "longer than 16 MiB" in mics(["--check"], tmp_path, "!" * (2**24 + 1)).stderr
 
 
 def test_overlaps_are_counted_up_to_a_limit(tmp_path: Path) -> None:

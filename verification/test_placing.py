@@ -10,7 +10,7 @@ import pytest
 
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import quaternion_from_axis, rotation_matrix
-from shared_runs import after_restart
+from shared_runs import after_restart, texts
 from test_input import mics
 
 TANK = """&run t_end = 0.01  physics = 'dry'  dt = 0.01 /
@@ -43,18 +43,7 @@ def test_missing_file_and_idle_variables(tmp_path: Path) -> None:
     assert len(errors) == 4 and all("the file has it" in line for line in errors), errors
 
 
-DIALECTS = {
-    "plain": "shape,x,y,z,time,name\ncube,0.1,0.15,0.05,0.5,A 1\ntetrapod,0.2,0.1,0.1,1,\n",
-    "semicolons": "shape;x;y;z;time;name\ncube;0.1;0.15;0.05;0.5;A 1\ntetrapod;0.2;0.1;0.1;1;\n",
-    "tabs": "shape\tx\ty\tz\ttime\tname\ncube\t0.1\t0.15\t0.05\t.5\tA 1\n"
-    "tetrapod\t0.2\t0.1\t0.1\t1\t\n",
-    "order": "name,time,z,y,x,shape\nA 1,0.5,0.05,0.15,0.1,cube\n,1,.1,.1,.2,tetrapod\n",
-    "office": "\ufeff# of the yard\r\n\r\nShape, X [m], Y [m] ,Z [m],Time [s],Name,,\r\n"
-    '"cube",0.1,0.15,0.05,0.5,"A 1",,\r\n,,,,,,,\r\ntetrapod,0.2,0.1,1e-1,1.0,,,\r\n',
-    "old": "shape,x,y,z,time,name\rcube,0.1,0.15,0.05,0.5,A 1\rtetrapod,0.2,0.1,0.1,1,\r",
-    "no end": "shape,x,y,z,time,name\ncube,0.1,0.15,0.05,0.5,A 1\ntetrapod,0.2,0.1,0.1,1,",
-}  # fmt: skip
-"""The same table as programs write it."""
+DIALECTS = texts("placing")["dialects"]
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
@@ -153,6 +142,17 @@ def run(folder: Path, case: str, code: int = 0) -> tuple[dict[str, np.ndarray], 
 
 
 LYING = "&body shape = 'cube'  position = 0.06, 0.06, 0.015 /\n"
+
+
+def test_a_crane_begins_above_a_slope_out_of_the_water(tmp_path: Path) -> None:
+    """With an empty z, 37 mm above the water: on what lies below its upper edge."""
+    (tmp_path / "slope.txt").write_text("2 2 0 0 0.12 0.12\n0 0.14 0 0.14\n")
+    (tmp_path / "plan.csv").write_text("shape,x,y,z,time\ncube,0.09,0.06,,0\n")
+    groups = ("&bed file = 'slope.txt' /\n&drop file = 'plan.csv'  lowering_speed = 0.2"
+              "  release = 'touch' /")  # fmt: skip
+    bodies, told = run(tmp_path, crane(tmp_path, groups, physics="light"))
+    assert "waits" not in told and list(bodies["status"]) == [2]
+    assert bodies["position"][1, 0, 2] == pytest.approx(0.07 * 1.75 + 0.015, abs=5e-4)
 
 
 def test_a_blocked_block_waits_is_raised_or_left_out(tmp_path: Path) -> None:

@@ -78,6 +78,7 @@ def test_what_lies_presses(quaternion: list[float], tmp_path: Path) -> None:
     late = time > time[moving][-1] + 0.5
     press = bodies.contact_force[late, 0, 2] / ((2300 - 1000) * 9.80665)
     assert late.sum() > 10 and np.abs(press - 1).max() < 0.05
+    assert bodies.impact_speed[0] > 0.8 * np.abs(bodies.velocity[:, 0, 2]).max()
 
 
 def test_every_law_is_tested() -> None:

@@ -10,7 +10,7 @@ from micstools.reading.reader import Run
 WAYS = ("divergence_tolerance", "coupling", "momentum", "solid_fraction", "subcells")
 VARIES = tuple(f"numerics {name}" for name in (*WAYS, "pressure_solver"))
 """Every way to compute keeps still water still."""
-QUICK = ("default", "paper", "split_cells")
+QUICK = ("default", "paper", "split_cells", "pose")
 SPEED_BAND = {1e-6: 1e-6, 1e-10: 1e-9}  # divergence tolerance [1/s]: largest speed [m/s]
 
 
