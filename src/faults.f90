@@ -153,7 +153,7 @@ contains
 
     if (fault%code /= exit_ok) return
     fault%code = exit_numerics
-    fault%message = 't = '//to_text(sim%clock%t)//' s, step '//to_text(sim%clock%step)//': '//what
+    fault%message = 't = '//brief(sim%clock%t, 7)//' s, step '//to_text(sim%clock%step)//': '//what
   end subroutine set_fault
 
 end module faults_m

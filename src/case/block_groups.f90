@@ -50,11 +50,11 @@ contains
     if (contact%solver == 'impulses') call v%pass_over('substep_ratio courant_max', &
       'solver = ''impulses''')
     call v%real('restitution', contact%restitution, between(0.0_wp, 1.0_wp, '-'), &
-      'speed after over speed before a central impact without friction; below 0.01 as 0.01', &
+      'speed after over speed before a central impact without friction; springs: 0.01 at least', &
       example='0.5')
     call v%real('contact_time', contact%contact_time, positive('s'), &
-      'how long such an impact lasts, less where restitution is below 0.135; shorter makes ' &
-      //'blocks stiffer. With springs a step of the blocks is a twentieth of it at most', &
+      'how long an impact acts, and the longest step of blocks that touch; shorter makes them ' &
+      //'stiffer. Springs: steps of a twentieth; impacts are shorter below restitution 0.135', &
       example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
       //'with '//law//', of each pair of spheres', example=spheres//law//'  k_n = 2e5')
@@ -179,8 +179,8 @@ contains
     call v%integer('refinement', shape%refinement, between(1, finest_shape), &
       'how finely a built-in form is cut into tetrahedra', example='3')
     call v%option('spheres', shape%spheres, 'centroid inscribed dense', 'contact spheres of the ' &
-      //'shape: one about the centroid of each tetrahedron as in the paper, the largest in ' &
-      //'each tetrahedron, or close together along the surface', example='''dense''')
+      //'shape: about the centroid of each tetrahedron at the surface as in the paper, the ' &
+      //'largest in each of these, or close together along the surface', example='''dense''')
     if (shape%spheres /= 'dense' .and. v%good('spheres')) call v%pass_over('sphere_spacing', &
       'spheres = '//quoted_text(trim(shape%spheres)))
     call v%real('sphere_spacing', shape%sphere_spacing, &
@@ -255,9 +255,9 @@ contains
     call v%about('one block, there from the start or released later', &
       ways='shape position|shape motion')
     call visit_shape_name(v, body%shape, shapes, required=.true.)
-    call v%text('motion', body%motion, 'a table that moves a fixed block: a CSV file of columns ' &
-      //'time, x, y, z and, if it turns, qw, qx, qy, qz; smooth between rows, held before the ' &
-      //'first and after the last', example='fixed = .true.  motion = ''door.csv''')
+    call v%text('motion', body%motion, 'a table that moves a fixed block, in place of position: ' &
+      //'a CSV file of columns time, x, y, z and, if it turns, qw, qx, qy, qz; smooth ' &
+      //'between rows, held before and after', example='fixed = .true.  motion = ''door.csv''')
     call v%real('position', body%position, any_number('m'), 'the centre of mass', &
       example='0.15, 0.05, 0.1', required=len_trim(body%motion) == 0)
     body%attitude_given = v%given('quaternion') .or. v%given('axis')
@@ -288,9 +288,9 @@ contains
     drop%line = v%group%line
     call v%about('blocks dropped one after another: at one place, along a line, or as a table ' &
       //'says', ways='shape position|shapes position|file')
-    call v%text('file', drop%file, 'a table of places in CSV, in place of shape to interval and ' &
-      //'orientation to velocity: columns shape, x, y, z (empty: on what lies there), time; if ' &
-      //'wanted qw, qx, qy, qz or yaw_deg, pitch_deg, roll_deg; vx, vy, vz; fixed; name', &
+    call v%text('file', drop%file, 'a table of places in CSV, in place of shape to interval, ' &
+      //'orientation to angle_deg, velocity: columns shape, x, y, z (empty: on what lies there), ' &
+      //'time; if wanted qw, qx, qy, qz or yaw_deg, pitch_deg, roll_deg; vx, vy, vz; fixed; name', &
       example='''plan.csv''')
     table = len_trim(drop%file) > 0
     if (.not. v%good('file')) table = v%given('file')

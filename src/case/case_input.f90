@@ -4,9 +4,9 @@
 !! Each group stands in one `visit_...` procedure. Nothing stops here: all that is wrong is
 !! collected.
 !!
-!! A choice, a variable of words, .true. or .false., leaves others without meaning: an error if one
-!! of them is given (those of its own group the `visit_...` procedures find). What `physics` leaves
-!! without meaning is passed over with a warning, so that a case can be tried with other physics.
+!! A switch, `physics` or another variable of words, .true. or .false., leaves others idle: they are
+!! passed over with a warning, so that a case can be tried with other physics. What a file, a motion
+!! or the kind of a shape leaves without meaning is an error (`visit_...`).
 module case_input_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text

@@ -86,6 +86,10 @@ contains
         end if
       end associate
       call cut_line(first(1))
+      do while (n > max(1, size(table%name)))   ! a comma at the end of each line
+        if (final(n) >= first(n)) exit
+        n = n - 1
+      end do
       if (remark) then   ! it may be a row that is lost if it has as many cells and a number in them
         if (n /= size(table%name)) cycle
         if (.not. any([(first(i) <= final(i) .and. verify(table%text(first(i):final(i)), &
@@ -96,10 +100,6 @@ contains
       end if
       if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
         //': no second " closes the text on this line')
-      do while (n > max(1, size(table%name)))   ! a comma at the end of each line
-        if (final(n) >= first(n)) exit
-        n = n - 1
-      end do
       if (size(table%name) > 0) then
         call add_row()
         cycle

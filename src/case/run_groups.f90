@@ -245,7 +245,7 @@ contains
     call v%real('divergence_tolerance', numerics%divergence_tolerance, positive('1/s'), &
       'the passes of the pressure end when no cell has a divergence above this', example='1e-7')
     call v%integer('max_pressure_passes', numerics%max_pressure_passes, between(1, 1000), &
-      'passes of the pressure in a step after which the run ends with code 3', example='20')
+      'passes of one solve of the pressure after which the run ends with code 3', example='20')
   end subroutine visit_numerics
 
 end module run_groups_m

@@ -8,7 +8,7 @@
 !! A block that is lowered comes in the same way, but is held: it moves down at a constant speed
 !! until it is let go at its place, at a height over what lies below, or where it touches that.
 !! Where it touches something earlier, or its sling goes slack, it is let go too; or, set down, it
-!! hangs in its sling from the touch on until that is slack (`sling_m`).
+!! hangs in its sling from just above what lies there until that is slack (`sling_m`).
 !!
 !! A block that passes an open side is taken out.
 module release_m

@@ -1,10 +1,10 @@
 !> Small cut cells and the cells with which they are merged (docs/theory.md, section 17).
 !!
 !! A small cut cell has its centre in a body. The fluid in it has no velocity of its own: it is
-!! merged with up to three target cells, with their centre in the fluid across its open faces, by
-!! shares that close with the face. A target and its parts of small cells are a group with one
-!! momentum (`merged_momentum_m`). A small cell without a target (a gap narrower than a cell) is
-!! unmerged.
+!! merged with up to four target cells, with their centre in the fluid across its open faces, else
+!! the nearest, by shares that close with the face. A target and its parts of small cells are a
+!! group with one momentum (`merged_momentum_m`). A small cell without a target (a gap narrower than
+!! a cell) is unmerged.
 module merged_cells_m
   use kinds_m, only: wp
   use vectors_m, only: norm
