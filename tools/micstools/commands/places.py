@@ -138,8 +138,8 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], chosen: Options)
 
 def _draw(given: argparse.Namespace, formats: list[str], survey: Survey, part: Ensemble,
           stem: Path, found: list[places.Landing]) -> None:  # fmt: skip
-    """The ellipses of a choice, and the probability that a unit covers a point."""
-    cover = np.isfinite([p.top for p in part.piles]).mean(axis=0)
+    """The ellipses of a choice, and how likely a unit lies over a point, of its complete piles."""
+    cover = np.isfinite([p.top for p in part.whole or part.piles]).mean(axis=0)
     lines = contours(cover, part.example.run.grid.low, part.step, survey)
     for name in formats:
         path = stem.with_name(f"{stem.name}.{name}")
