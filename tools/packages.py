@@ -115,15 +115,9 @@ def _box(
 ) -> None:
     x, y, wide = place
     box = FancyBboxPatch(
-        (x - wide / 2, y - TALL / 2),
-        wide,
-        TALL,
-        boxstyle="round,pad=0,rounding_size=0.08",
-        facecolor="#f4f4f4",
-        edgecolor=COLOURS.get(package, GREY),
-        linewidth=1.3,
-        zorder=3,
-    )
+        (x - wide / 2, y - TALL / 2), wide, TALL, boxstyle="round,pad=0,rounding_size=0.08",
+        facecolor="#f4f4f4", edgecolor=COLOURS.get(package, GREY), linewidth=1.3, zorder=3,
+    )  # fmt: skip
     axis.add_patch(box)
     _say(axis, x, y + 0.12, title, fontsize=10, weight="bold")
     _say(axis, x, y - 0.14, words, fontsize=8, color="#333333")
@@ -140,15 +134,9 @@ def _arrow(axis: Axes, user: str, used: str, n: int) -> None:
     end = (x_end, BOXES[used][1] + TALL / 2)
     colour = COLOURS.get(user, GREY)
     line = FancyArrowPatch(
-        start,
-        end,
-        arrowstyle="-|>,head_length=7,head_width=3.5",
-        shrinkA=0,
-        shrinkB=0,
-        color=colour,
-        linewidth=0.8 + 0.07 * n,
-        zorder=1,
-    )
+        start, end, arrowstyle="-|>,head_length=7,head_width=3.5", shrinkA=0, shrinkB=0,
+        color=colour, linewidth=0.8 + 0.07 * n, zorder=1,
+    )  # fmt: skip
     axis.add_patch(line)
     x, y = (a + ALONG * (b - a) for a, b in zip(start, end, strict=True))
     behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}

@@ -70,10 +70,11 @@ class Case:
             or any(run.ended.startswith("code ") and not run.good for run in self.runs)
         ):
             return "miss"
-        if self.checks is None:
-            return "not run"
-        if self.checks.failed:
+        checks = self.checks.results + self.checks.routine if self.checks else []
+        if any(r.counts and not r.holds for r in checks):
             return "miss"
+        if not self.checks or not any(r.counts for r in self.checks.results):
+            return "not run"
         return "pass" if all(run.good for run in self.runs) else "part"
 
 
@@ -268,7 +269,8 @@ def _results(results: list[Result]) -> Markup | None:
     rows = []
     for r in results:
         mark = ("pass" if r.holds else "miss") if r.counts else "info"
-        word = tag("span", mark if r.counts else "for information", class_=mark)
+        words = f": {r.known}" if r.known and not r.holds else ""
+        word = tag("span", mark + words if r.counts else "for information", class_=mark)
         rows.append([r.quantity, r.ours, r.reference, r.error, r.band, word])
     heads = ["quantity", "ours", "reference", "error", "band", ""]
     return _table(heads, rows) if rows else None

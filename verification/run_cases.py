@@ -42,6 +42,7 @@ MPI_SETTINGS = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1",
 }
+KNOWN_MISSES = tomllib.loads((ROOT / "verification" / "known_misses.toml").read_text())
 COST = 10.0
 """Seconds on one core that a run takes which does not say so; the longest run of `make test`."""
 
@@ -79,9 +80,6 @@ class Planned:
     text: str  # of the case file
     cost: float  # about that many seconds on one core
     fine: bool = False  # beyond what three resolutions need: for `FULL=1 make verify` only
-    misses: bool = (
-        False  # is known to miss a band: `make verify` counts it, `make test` leaves it out
-    )
 
     def write(self, work: Path) -> Path:
         """Put the case file into a folder of its own beside the results."""
@@ -117,24 +115,21 @@ def planned(case: str, work: Path) -> list[Planned]:
         text = path.read_text()
         stated = re.search(r"^! cost: ([\d.]+) s", text, re.MULTILINE)
         own_cost = float(stated[1]) if stated else COST
-        misses = re.search(r"^! misses:", text, re.MULTILINE) is not None
-        found.append(Planned(case, path.stem, text, own_cost, misses=misses))
+        found.append(Planned(case, path.stem, text, own_cost))
     if (folder / "variants.toml").is_file():
         tables = tomllib.loads((folder / "variants.toml").read_text())
         for name, table in tables.items():
             base = folder / table.pop("from", "case.nml")
             own_cost, fine = float(table.pop("cost", COST)), bool(table.pop("fine", False))
-            misses = bool(table.pop("misses", ""))
-            text = changed(base.read_text(), table)
-            found.append(Planned(case, name, text, own_cost, fine, misses))
+            found.append(Planned(case, name, changed(base.read_text(), table), own_cost, fine))
     return found
 
 
 def quick(plans: list[Planned]) -> list[Planned]:
-    """Those of the runs of a case that `make test` takes: short ones that are not known to miss,
-    of these the ones that fit a pattern of `QUICK` in check.py, if it has some."""
+    """Those of the runs of a case that `make test` takes: short ones that are not known to break
+    off, of these the ones that fit a pattern of `QUICK` in check.py, if there are any."""
     patterns = getattr(checker(plans[0].case), "QUICK", ("*",)) if plans else ()
-    short = [plan for plan in plans if plan.cost <= COST and not plan.misses]
+    short = [p for p in plans if p.cost <= COST and p.name not in KNOWN_MISSES.get(p.case, {})]
     return [plan for plan in short if any(fnmatch(plan.name, pattern) for pattern in patterns)]
 
 
@@ -195,6 +190,7 @@ def judge(name: str, runs: list[Run]) -> Checks:
     """The check of a case on its runs, and what has to hold in each of them."""
     checks = Checks(name)
     checker(name).check(runs, checks)
+    checks.know(KNOWN_MISSES.get(name, {}))
     for run in runs:
         sound(run, checks)
     return checks

@@ -71,6 +71,8 @@ def test_rows_for_information_and_bounds() -> None:
     assert checks.failed == 0
     checks.within("past", 2.5, 1.0, 2.0)
     assert checks.failed == 1
+    checks.know({"pas": "why"})
+    assert checks.failed == 0 and [r.mark for r in checks.results] == ["(misses)", "ok", "misses"]
     assert [r.error for r in checks.results] == ["+100 %", "0", "+0.5"]
 
 

@@ -96,17 +96,11 @@ def placing(runs: Sequence[Run], area: Area) -> Placing | None:
     low, high = np.percentile([area.share_outside(one) for one in each], [5, 95])
     x, y, sx, sy, half, most, outside = (float(v) for v in found)
     return Placing(
-        blocks=sum(map(len, each)),
-        left_out=sum(map(waiting, runs)),
-        centre=(x, y),
-        spread=(sx, sy),
-        half_within=half,
-        most_within=most,
-        area=area,
-        outside=outside,
+        blocks=sum(map(len, each)), left_out=sum(map(waiting, runs)), centre=(x, y),
+        spread=(sx, sy), half_within=half, most_within=most, area=area, outside=outside,
         outside_of_runs=(float(low), float(high)),
         interval_95={k: (float(a), float(b)) for k, (a, b) in zip(NUMBERS, bounds, strict=True)},
-    )
+    )  # fmt: skip
 
 
 def _numbers(each: Sequence[Array], area: Area) -> Array:

@@ -9,6 +9,7 @@ from micstools.reading.reader import Run
 
 RMS_BAND = 0.02  # of the initial amplitude
 COUNTS_FROM = 32  # cells per wavelength
+QUICK = ()
 WAVENUMBER, AMPLITUDE = 2 * np.pi, 0.01
 
 

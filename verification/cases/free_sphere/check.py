@@ -13,7 +13,7 @@ VARIES = tuple(
 """Of one run."""
 THEORY_BAND, STEP_BAND = 0.02, 0.01
 START_BAND = 0.03  # of way and speed at the ends of the first steps, at the default step
-SPIN_BAND = 1.0  # speed of the surface by spin over that of the sphere
+SPIN_BAND = 0.5  # speed of the surface by spin over that of the sphere
 SHORT = 0.01  # s: runs with longer steps are looked at step by step
 
 
@@ -30,7 +30,7 @@ def start(run: Run, theory: float, checks: Checks) -> None:
     way = b.position[:, 0, 2] - b.position[0, 0, 2]
     diameter = 2 * run.shapes[b.shape[0]].radius
     for row in range(1, len(t)):
-        if abs(way[row]) > diameter / 30:
+        if abs(theory) * t[row] ** 2 / 2 > diameter / 30:
             break
         name = f"{run.folder.name}: step {row}"
         checks.close(f"{name}, way [m]", way[row], theory * t[row] ** 2 / 2, START_BAND)

@@ -7,7 +7,7 @@ from measures.facts import cells as cells_along
 from measures.facts import liquid, size
 from micstools.reading.reader import Run
 
-QUICK = ("Re30_04",)
+QUICK = ()  # its figures compare with finer cells
 BAND = 0.1
 SPHERICITY = {"cube": (np.pi / 6) ** (1 / 3), "hexapod": 0.589877}
 

@@ -7,7 +7,7 @@ from measures.facts import cells as cells_along
 from measures.facts import liquid
 from micstools.reading.reader import Run
 
-QUICK = ("dolos_lab_06",)
+QUICK = ()  # its figures compare with finer cells
 BANDS = {12.0: 0.15, 24.0: 0.10}  # of the speed with half the cells, by the finer grid
 MASKELL = 2.5  # rise of the dynamic pressure over C_d S/C
 EXPECTED = {  # drag coefficient on the sphere of the same volume, see README.md

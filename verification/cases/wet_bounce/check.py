@@ -8,6 +8,7 @@ from micstools.reading.reader import Run
 VARIES = ("contact restitution",)
 QUICK = ("case", "step_1", "cells_12")
 BAND = 0.05
+MOVED = 1.27  # what the ball moves with over its mass
 LATER = 3.0e-3  # s after the contact
 DIAMETER, COARSE = 0.02, 8  # m; cells along it, of the runs with different steps
 
@@ -25,7 +26,7 @@ def check(runs: list[Run], checks: Checks) -> None:
     """Every step must give the restitution."""
     found = []
     for run in runs:
-        wanted, value = run.value("contact", "restitution"), restitution(run)
+        wanted, value = run.value("contact", "restitution") ** (1 / MOVED**0.5), restitution(run)
         share = run.value("run", "dt") / run.value("contact", "contact_time")
         cells = round(DIAMETER / float(run.grid.spacing[0]))
         name = f"step {share:g} contact times, {cells} cells per diameter: restitution"
