@@ -73,12 +73,12 @@ contains
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)
     call store_places(sim, fault)
-    if (sim%case%run%cfl_max > 0.0_wp) return
+    if (sim%case%run%cfl_max > 0.0_wp .and. sim%case%run%cfl_max <= highest_courant) return
     rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)   ! nothing shortens the step
-    courant = sim%case%run%dt*max(rate%carried, rate%followed)
+    courant = sim%clock%dt*max(rate%carried, rate%followed)
     if (.not. courant <= highest_courant) call set_fault(sim, 'Courant number '//brief(courant) &
-      //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
-      //' keeps it', fault)
+      //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max' &
+      //' lets it', fault)
   end subroutine find_fault
 
   !> A block moves as far as its speeds at both ends of the step and its weight let it; a cell more

@@ -59,6 +59,8 @@ def test_fixed_step_too_long(dt: float, t_end: float, tmp_path: Path) -> None:
     assert code == 3, said
     assert "Courant number" in said and "&run dt is too long for this flow" in said
     assert complete(tmp_path, 3)
+    stream = "&run dt=9 cfl_max=99 t_end=9 /\n&fluid single_phase=T velocity=9,0,0 /\n&boundary "
+    assert mics(tmp_path, stream + "x_min='periodic' x_max='periodic' /\n")[0] == 3
 
 
 @pytest.mark.parametrize(("dt", "cfl_max"), [(0.02, 0.0), (1.0, 0.5)])

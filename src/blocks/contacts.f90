@@ -77,6 +77,7 @@ contains
     end associate
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
+    contacts%loads%twist(:, 1:) = blocks%l - blocks%l_start   ! by slings
     contacts%loads%peak = 0.0_wp
     contacts%met%n = 0
     call update_counterparts(walls, gravity, blocks, contacts%counterparts)

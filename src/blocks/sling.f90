@@ -69,6 +69,7 @@ contains
     end associate
     call brace(dt, b, blocks)
     associate (q => blocks%q(:, b), l => blocks%l(:, b), omega => blocks%omega(:, b))
+      blocks%l_start(:, b) = matmul(inverse3(space_tensor(q, blocks%inverse_inertia(:, :, b))), omega)
       up = matmul(rotation_matrix(q), blocks%upright(:, b))
       l = matmul(space_tensor(q, blocks%shapes(blocks%shape(b))%inertia), omega) &
         + dt*lever(b, blocks)*[up(2), -up(1), 0.0_wp]
