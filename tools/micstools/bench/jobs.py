@@ -74,15 +74,11 @@ def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:
     seconds = {k: v for k, (v, _) in found.timers.items() if k not in _NOT_STEPPING}
     stepping = sum(seconds.values())
     return Timing(
-        wall=wall,
-        cpu=cpu,
-        memory=memory,
-        simulated=float(found.series.time[-1]),
-        steps=len(found.series.time) - 1,
+        wall=wall, cpu=cpu, memory=memory, stepping=stepping,
+        simulated=float(found.series.time[-1]), steps=len(found.series.time) - 1,
         size=int(np.prod(settings.value(job.text, "grid", "cells"))),
-        stepping=stepping,
         phases={k: v / stepping for k, v in seconds.items()},
-    )
+    )  # fmt: skip
 
 
 def pile(n: int, seconds: float, program: Path, threads: int, folder: Path, **case: Any) -> Timing:

@@ -71,21 +71,13 @@ def client(queue: Queue, jobs: int, folder: Path) -> Iterator[Any]:
     dask.config.set({"distributed.scheduler.http.routes": []})
     try:
         found = kind(
-            n_workers=jobs,
-            job_cls=_telling(kind.job_cls, answers),
-            cores=1,
-            processes=1,
-            nanny=False,
-            python=shlex.quote(sys.executable),
-            log_directory=path if plain else None,
-            security=Security.temporary(),
-            shared_temp_directory=str(keys),
+            n_workers=jobs, job_cls=_telling(kind.job_cls, answers), cores=1, processes=1,
+            nanny=False, python=shlex.quote(sys.executable), security=Security.temporary(),
+            log_directory=path if plain else None, shared_temp_directory=str(keys),
             scheduler_options={"dashboard": False, "dashboard_address": _NO_PAGE},
             worker_extra_args=[*more, "--no-dashboard", "--dashboard-address", _NO_PAGE],
-            job_name="mics",
-            silence_logs=logging.CRITICAL,
-            **_USUAL | queue.options,
-        )
+            job_name="mics", silence_logs=logging.CRITICAL, **_USUAL | queue.options,
+        )  # fmt: skip
     except (ValueError, RuntimeError, OSError) as error:
         raise BadRun(f"{OPTION} {queue.system}: {error}") from error
     with found:

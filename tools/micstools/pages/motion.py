@@ -14,7 +14,7 @@ from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array, IntArray
 
 FRAMES_A_SECOND = 30
-LONGEST = 600  # frames of a run
+FEWEST, LONGEST = 60, 600  # frames of a run
 POSES = 400_000  # places of blocks in a page: about 9 MB of it
 SURFACE_BYTES = 400_000  # of the water
 SPEED_BYTES = 400_000  # of its speed
@@ -34,7 +34,8 @@ def packed(values: ArrayLike, kind: str) -> str:
 def frames(run: Run) -> IntArray:
     """Rows of the run to show, evenly in time, first and last among them."""
     time, n = run.bodies.time, max(1, run.bodies.n)
-    wanted = min(LONGEST, int(FRAMES_A_SECOND * (time[-1] - time[0])) + 2, max(2, POSES // n))
+    usual = max(FEWEST, int(FRAMES_A_SECOND * (time[-1] - time[0])) + 2)
+    wanted = min(LONGEST, usual, max(2, POSES // n))
     targets = np.linspace(time[0], time[-1], wanted)
     return np.unique(np.searchsorted(time, targets).clip(0, len(time) - 1))
 

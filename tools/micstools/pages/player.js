@@ -76,7 +76,7 @@ class Player {
   show(time) {
     this.stage.set(time);
     this.slider.value = this.stage.time;
-    this.clock.textContent = this.stage.time.toFixed(2) + ' s';
+    this.clock.textContent = this.stage.time.toFixed(this.stage.times[this.stage.times.length - 1] < 2 ? 4 : 2) + ' s';
     this.slider.setAttribute('aria-valuetext', this.clock.textContent);
     if (!this.still) moveMarks(this.stage.time);
   }

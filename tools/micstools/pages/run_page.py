@@ -286,14 +286,15 @@ def curves(run: Run, shown: Units) -> list[Markup]:
         (force.of(np.linalg.norm(b.contact_force, axis=2)), f"contact force [{force.name}]"),
     ]  # fmt: skip
     since = [b.time >= b.release_time[k] - 1e-12 for k in chosen]
+    order = {int(k): n for n, k in enumerate(b.dropped)}  # as the player colours them
     drawn = []
     for values, name in wanted:
-        each = [Curve(b.time[rows], values[rows, k], order)
-                for order, (k, rows) in enumerate(zip(chosen, since, strict=True))]  # fmt: skip
+        each = [Curve(b.time[rows], values[rows, k], order[k])
+                for k, rows in zip(chosen, since, strict=True)]  # fmt: skip
         if np.isfinite(values).any():
             drawn.append(charts.lines(each, "time [s]", name))
     few = f"The first {_MANY} of {b.dropped.size} blocks." if b.dropped.size > _MANY else ""
-    names = [(order, b.name[k] or f"block {k + 1}") for order, k in enumerate(chosen)]
+    names = [(order[k], b.name[k] or f"block {k + 1}") for k in chosen]
     return [tag("div", *drawn, class_="charts"), charts.key(names), tag("p", few, class_="note")]
 
 

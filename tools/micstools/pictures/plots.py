@@ -102,7 +102,9 @@ def _draw(axis: Axes, run: Run, panel: Panel) -> None:
 def history(run: Run) -> Figure:
     """Heights, speeds, forces, liquid, energies and the work of the solver against time."""
     matplotlib.rcParams.update({"font.size": 9, "axes.titlesize": 10, "axes.grid": True})
-    matplotlib.rcParams.update({"grid.alpha": 0.3, "axes.spines.top": False})
+    matplotlib.rcParams.update(
+        {"grid.alpha": 0.3, "axes.spines.top": False, "text.parse_math": False}
+    )
     panels = _panels(run)
     rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(11, 2.4 * rows), layout="constrained")

@@ -35,6 +35,7 @@ _WATER = "#2f86c6"
 _RAMP = LinearSegmentedColormap.from_list(
     "cover", ["#fafaf7", "#baded5", "#60b0b8", "#266e96", "#162a5c"]
 )
+matplotlib.rcParams["text.parse_math"] = False  # a $ in a name is one
 _WIDE = 7.1  # of a figure, that of an A4 page between its margins [inch]
 _MANY = 200  # units: of more no names are written
 _FLAT = 0.05  # slope below which there is none to draw a section down
@@ -47,9 +48,9 @@ def plan(given: Handover) -> Figure:
     maps, within = given.measured[0], given.within
     ny, nx = maps.bed.shape
     high = maps.low + maps.step * np.array([nx, ny])
-    corners = given.survey.of(
-        np.array([maps.low, high, [maps.low[0], high[1]], [high[0], maps.low[1]]])
-    )
+    around = np.array([maps.low, high, [maps.low[0], high[1]], [high[0], maps.low[1]]])
+    bodies = given.bodies
+    corners = np.concatenate([given.survey.of(around), *map(given.hull, bodies.values())])
     size = np.ptp(corners, axis=0)
     figure = Figure(figsize=(_WIDE, min(9.5, 0.9 + (_WIDE - 0.9) * size[1] / size[0])),
                     layout="constrained")  # fmt: skip
@@ -61,7 +62,6 @@ def plan(given: Handover) -> Figure:
         lines = axes.contour(at[..., 0], at[..., 1], level, 10, colors="#b79c6c", linewidths=0.5,
                              zorder=0)  # fmt: skip
         axes.clabel(lines, fontsize=6)
-    bodies = given.bodies
     axes.add_collection(PolyCollection([given.hull(body) for body in bodies.values()],
                         facecolors=[_colour(given, given.places[k]) for k in bodies],
                         edgecolors="#333333", linewidths=0.5, alpha=0.8))  # fmt: skip

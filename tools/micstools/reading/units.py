@@ -126,7 +126,10 @@ def of_size(length: float) -> Units:
 
 
 def of_run(run: Run) -> Units:
-    """The units of a run: those of its largest block, of its tank where there are no blocks."""
-    lengths = [run.shapes[name].length for name in set(run.bodies.shape)]
+    """The units of a run: those of its largest free block, of any block where none is free, of its
+    tank where there are no blocks."""
+    shapes = zip(run.bodies.shape, run.bodies.fixed, strict=False)
+    free = {name for name, fixed in shapes if not fixed} or set(run.bodies.shape)
+    lengths = [run.shapes[name].length for name in free]
     tank = float((run.grid.high - run.grid.low).max())
     return of_size(max(lengths, default=_TANK * tank))

@@ -169,11 +169,15 @@ class Draft:
         place = settings.value(self.text, group, "position", n)
         if place is None:
             raise BadRun(f"&{group} {n + 1} has no position of its own: change its file")
-        new = [
-            round(round((float(p) + d) / self.step) * self.step, 12)
-            for p, d in zip(place, by, strict=True)
-        ]
-        self.text = settings.set_group(self.text, group, {"position": new}, n)
+        ends = {"position": place, "to": settings.value(self.text, group, "to", n)}
+        new = {name: [self._moved(float(p), d) for p, d in zip(end, by, strict=True)]
+               for name, end in ends.items() if end is not None}  # fmt: skip
+        self.text = settings.set_group(self.text, group, new, n)
+
+    def _moved(self, place: float, by: float) -> float:
+        """A coordinate moved to a round place; one that hardly moves stays as it is."""
+        moved = round(round((place + by) / self.step) * self.step, 12)
+        return moved if abs(by) > self.step / 2 else place
 
     def _write(self, order: dict[str, Any]) -> None:
         text = settings.plain(str(order["text"]))
