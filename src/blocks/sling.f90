@@ -68,12 +68,12 @@ contains
       blocks%goal(b) = blocks%goal(b) - dt*down
     end associate
     call brace(dt, b, blocks)
-    associate (q => blocks%q(:, b), l => blocks%l(:, b), omega => blocks%omega(:, b))
-      blocks%l_start(:, b) = matmul(inverse3(space_tensor(q, blocks%inverse_inertia(:, :, b))), omega)
+    associate (q => blocks%q(:, b), l => blocks%l(:, b), w => blocks%omega(:, b))
+      blocks%l_start(:, b) = matmul(inverse3(space_tensor(q, blocks%inverse_inertia(:, :, b))), w)
       up = matmul(rotation_matrix(q), blocks%upright(:, b))
-      l = matmul(space_tensor(q, blocks%shapes(blocks%shape(b))%inertia), omega) &
+      l = matmul(space_tensor(q, blocks%shapes(blocks%shape(b))%inertia), w) &
         + dt*lever(b, blocks)*[up(2), -up(1), 0.0_wp]
-      omega = angular_velocity(q, l, blocks%inverse_inertia(:, :, b))
+      w = angular_velocity(q, l, blocks%inverse_inertia(:, :, b))
     end associate
   end subroutine pull_sling
 
