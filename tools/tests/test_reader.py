@@ -306,11 +306,12 @@ def test_arrays_and_several_figures() -> None:
     assert site.length.row([26.0, 6.0, 12.8], " x ") == "26 x 6 x 12.8\u00a0m"
 
 
-def test_the_largest_block_decides_or_the_tank() -> None:
-    known = (([0.05, 2.0], 1.0, "m"), ([0.05], 1.0, "mm"), ([], 1.0, "mm"), ([], 100.0, "m"))
-    for lengths, tank, unit in known:
+def test_the_largest_free_block_decides_or_the_tank() -> None:
+    known = (([0.05, 2], 2, 1, "m"), ([0.05, 2], 1, 1, "mm"), ([], 0, 1, "mm"), ([], 0, 100, "m"))
+    for lengths, free, tank, unit in known:
         shapes = {str(k): SimpleNamespace(length=v) for k, v in enumerate(lengths)}
-        bodies = SimpleNamespace(n=len(shapes), shape=list(shapes))
+        fixed = [k >= free for k in range(9)]
+        bodies = SimpleNamespace(n=len(shapes), shape=list(shapes), fixed=fixed)
         grid = SimpleNamespace(low=np.zeros(3), high=np.array([tank, 0.1, 0.1]))
         run: Any = SimpleNamespace(bodies=bodies, shapes=shapes, grid=grid)
         assert units.of_run(run).length.name == unit
