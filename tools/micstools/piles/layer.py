@@ -10,10 +10,8 @@ N/A = n k_t (1 - n_v)/D_n^2, with the number of layers n, the area A along the s
 thickness t across it and the volume V of the N units. Both ways give one packing.
 """
 
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +19,7 @@ from numpy.typing import NDArray
 from micstools.piles import pile_form
 from micstools.piles.maps import ground_map, height_map
 from micstools.reading.overlap import Placed, images, present_bodies, without_machines
+from micstools.reading.places import MEANINGS
 from micstools.reading.reader import Run
 from micstools.reading.units import Units, figure
 from micstools.shapes.geometry import Array, volume_in_box
@@ -36,8 +35,7 @@ THIN = 0.01
 MOST_SQUARES = 4_000_000
 """Of a map; a larger layer has coarser ones."""
 
-_MEANINGS = tomllib.loads((Path(__file__).parents[1] / "meanings.toml").read_text())
-DEFINITIONS: dict[str, str] = _MEANINGS["layer"]
+DEFINITIONS: dict[str, str] = MEANINGS["layer"]
 """What the numbers of a layer mean."""
 
 

@@ -68,8 +68,8 @@ class Place:
     exit_time: float
 
 
-_MEANINGS = tomllib.loads((Path(__file__).parents[1] / "meanings.toml").read_text())
-MEANING: dict[str, str] = _MEANINGS["place"]
+MEANINGS = tomllib.loads((Path(__file__).parents[1] / "meanings.toml").read_text())
+MEANING: dict[str, str] = MEANINGS["place"]
 """The columns of a table of places."""
 
 
