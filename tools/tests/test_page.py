@@ -114,10 +114,22 @@ def test_motions_are_those_of_the_run(loose_pile: Run) -> None:
     place = np.frombuffer(base64.b64decode(scene["place"]), "<f4").reshape(len(rows), b.n, 3)
     turn = np.frombuffer(base64.b64decode(scene["turn"]), "<i2").reshape(len(rows), b.n, 4)
     assert rows[0] == 0 and rows[-1] == len(b.time) - 1
-    assert place == pytest.approx(b.position[rows], abs=1e-7)  # the lower corner is at 0
+    there = b.time[rows][:, None] >= b.entry_time
+    assert place[there] == pytest.approx(b.position[rows][there], abs=1e-7)  # the corner is at 0
     assert turn / 32767 == pytest.approx(b.quaternion[rows], abs=2e-5)
     assert np.diff(b.time[rows]).max() <= 1.5 / motion.FRAMES_A_SECOND
     assert [body["release"] for body in scene["bodies"]][:4] == [0.0, 0.0, 0.0, 0.0]
+
+
+def test_a_block_waits_where_it_is_first_seen(loose_pile: Run) -> None:
+    """Else it would fly there from its waiting place within a frame."""
+    run = Run(loose_pile.folder)
+    k, rows = int(run.bodies.dropped[-1]), motion.frames(run)
+    waits = run.bodies.time < run.bodies.entry_time[k]
+    run.bodies.position[waits, k] = 9.0
+    place = np.frombuffer(base64.b64decode(motion.scene(run)["place"]), "<f4")
+    seen, late = place.reshape(len(rows), run.bodies.n, 3)[:, k], waits[rows]
+    assert late.sum() > 9 and (seen[late] == seen[late.sum()]).all() and (seen < 1.0).all()
 
 
 SURVEY = (354200.0, 5621080.0, -12.0)

@@ -113,6 +113,17 @@ def test_pictures_have_one_scale_of_arrows(loose_pile: Run, tmp_path: Path) -> N
     assert (heads[0] < 100).any()
 
 
+@can_draw
+def test_a_picture_in_a_survey_is_the_same(tmp_path: Path) -> None:
+    """VTK makes arrows, water and tank in single precision."""
+    seen = []
+    for origin in ((0.0, 0.0, 0.0), (354200.5, 5621080.0, -12.0)):
+        motion = Motion(t_end=1.0, scale=100 / 3, origin=origin)
+        run, style = Run(write_run(tmp_path / str(len(seen)), motion)), scene.Style(width=300)
+        seen.append(colours(scene.picture(run, 0.5, "front", tmp_path / "a.png", style)))
+    assert (np.abs(seen[0] - seen[1]).max(axis=1) > 40).mean() < 0.002
+
+
 def test_the_line_above_a_picture_is_never_cut_off() -> None:
     """In a narrow picture it takes several lines, with the same ink."""
     keys = [labels.Key("arrow", 90, "0.05 m/s"), labels.Key("bar", 70, "200 mm")]

@@ -20,13 +20,15 @@ def draw_pictures(given: argparse.Namespace) -> int:
         if not 0 <= t <= last + 1e-9:
             raise BadRun(f"--times {t:g}: the run goes from 0 to {last:g} s")
     views = given.view or scene.telling_views(run)
+    fine = next(n for n in range(3, 18) if len({f"{t:.{n}f}" for t in times}) == len(set(times)))
     speed = scene.arrow_speed(run, times, views)
     style = scene.Style(width=given.width, speed=speed)
     for view in views:
         pictures = []
         for number, t in enumerate(times, start=1):
             print(f"{view} at {t:g} s, {number} of {len(times)}", flush=True)
-            pictures.append(scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style))
+            path = out / f"{view}-{t:0{fine + 3}.{fine}f}.png"
+            pictures.append(scene.picture(run, t, view, path, style))
         plots.contact_sheet(pictures, out / f"{view}.png", columns=min(4, len(pictures)))
         many = "1 picture" if len(pictures) == 1 else f"{len(pictures)} pictures"
         print(f"{many} and a sheet: {out / f'{view}.png'}")

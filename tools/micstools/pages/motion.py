@@ -59,6 +59,10 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
     speed = np.linalg.norm(b.velocity[rows], axis=2)
     fastest = float(np.nanmax(speed, initial=0.0)) or 1.0
     colours = block_colours(b.dropped, b.n)
+    # A block that is not there yet stands where it is first shown, not where it waits
+    early = b.time[rows][:, None] < b.entry_time - 1e-12
+    first = rows[early.sum(axis=0).clip(max=len(rows) - 1)]
+    place = np.where(early[..., None], b.position[first, np.arange(b.n)], b.position[rows])
     return {
         "bodies": [
             {
@@ -73,7 +77,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
             for k in range(b.n)
         ],
         "times": packed(b.time[rows], "f4"),
-        "place": packed(run.into_tank(b.position[rows]) - run.grid.low, "f4"),
+        "place": packed(run.into_tank(place) - run.grid.low, "f4"),
         "turn": packed(np.round(32767 * unit(b.quaternion[rows])), "i2"),
         "speed": packed(np.round(255 * np.nan_to_num(speed) / fastest), "u1"),
         "fastest": fastest,
@@ -114,13 +118,9 @@ def tank(run: Run, north: float | None = None) -> dict[str, Any]:
     degrees from +y towards +x; +y where it is not known. Places count from the lower corner of the
     tank, the `origin`: single precision would not hold coordinates of a survey."""
     points, triangles = bed(run)
-    shown, low = units.of_run(run), run.grid.low
+    used, low = units.of_run(run), run.grid.low
     return {
-        "unit": {
-            "name": shown.length.name,
-            "size": shown.length.size,
-            "decimals": shown.place.decimals,
-        },
+        "unit": vars(used.length) | {"decimals": used.place.decimals},
         "north": north or 0.0,
         "period": run.period.tolist(),
         "origin": low.tolist(),

@@ -19,7 +19,7 @@ from micstools.piles import pile
 from micstools.reading import units, vtk_data
 from micstools.reading.overlap import Placed, present_bodies
 from micstools.reading.reader import Fields, Run
-from micstools.reading.vtk_data import shares_at_points, triangles_of, water_surface
+from micstools.reading.vtk_data import moved, triangles_of
 from micstools.shapes.geometry import Array, IntArray
 from micstools.shapes.shape import Shape
 
@@ -141,7 +141,8 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     if style.label:
         labels.number_blocks(image, _block_numbers(plotter, run, row, camera))
         keys = _keys(run, speed, width / camera.width_at_focus, view)
-        image = labels.with_header(image, f"t = {run.bodies.time[row]:.2f} s", keys)
+        places = 4 if run.bodies.time[-1] < 2 else 2
+        image = labels.with_header(image, f"t = {run.bodies.time[row]:.{places}f} s", keys)
     plotter.close()
     image.save(path)
     return path
@@ -257,11 +258,11 @@ def add_tank(plotter: Plotter, low: Array, high: Array) -> None:
     """Add the edges of the tank and its floor."""
     import pyvista as pv
 
-    bounds = np.stack([low, high], axis=1).ravel()
-    plotter.add_mesh(pv.Box(bounds=bounds).extract_all_edges(), color="#505050", line_width=2)
-    height = high[2] - low[2]
-    floor = pv.Box(bounds=[*bounds[:4], low[2] - 0.012 * height, low[2] - 0.002 * height])
-    plotter.add_mesh(floor, color="#e8e4dc", ambient=0.4)
+    x, y, z = high - low
+    frame = pv.Box(bounds=[0, x, 0, y, 0, z]).extract_all_edges()
+    plotter.add_mesh(moved(frame, low), color="#505050", line_width=2)
+    floor = pv.Box(bounds=[0, x, 0, y, -0.012 * z, -0.002 * z])
+    plotter.add_mesh(moved(floor, low), color="#e8e4dc", ambient=0.4)
 
 
 def add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
@@ -300,27 +301,15 @@ def add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
 def add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
     """Add the water surface where no solid is, and the body of water as a faint tint, in place of
     those of another time."""
-    grid = shares_at_points(run, fields)
     for name in WATER_PARTS:
         plotter.remove_actor(name, render=False)
-    if not fields.liquid.min() < 0.5 < fields.liquid.max():
-        return
-    surface = water_surface(grid)
+    surface, body = vtk_data.water(run, fields)
     if surface.n_points:
-        plotter.add_mesh(
-            surface,
-            name=WATER_PARTS[0],
-            color=WATER,
-            opacity=0.6,
-            smooth_shading=True,
-            specular=0.6,
-            specular_power=30,
-        )
-    water = grid.clip_scalar(scalars="liquid", value=0.5, invert=False).extract_surface(
-        algorithm="dataset_surface"
-    )
-    look = {"color": WATER, "opacity": 0.12, "lighting": False}
-    plotter.add_mesh(water, name=WATER_PARTS[1], **look)
+        look: dict[str, Any] = {"opacity": 0.6, "specular": 0.6, "specular_power": 30}
+        plotter.add_mesh(surface, name=WATER_PARTS[0], color=WATER, smooth_shading=True, **look)
+    if body.n_points:
+        look = {"color": WATER, "opacity": 0.12, "lighting": False}
+        plotter.add_mesh(body, name=WATER_PARTS[1], **look)
 
 
 def add_still_water(plotter: Plotter, run: Run) -> None:
@@ -330,17 +319,15 @@ def add_still_water(plotter: Plotter, run: Run) -> None:
     level = pile.still_level(run) if run.physics == "light" else None
     if level is None:
         return
-    low, high = run.grid.low.copy(), run.grid.high.copy()
-    high[2] = min(level, high[2])
-    outside = 1e-3 * (run.grid.high - run.grid.low)  # not in the sides of a bed
-    body = np.stack([low - outside, np.append(high[:2] + outside[:2], high[2])], axis=1).ravel()
+    low, size = run.grid.low, run.grid.high - run.grid.low
+    x, y, z = 1e-3 * size  # not in the sides of a bed
+    depth = min(level - low[2], size[2])
+    body = pv.Box(bounds=[-x, size[0] + x, -y, size[1] + y, -z, depth])
     look = {"color": WATER, "opacity": 0.12, "lighting": False}
-    plotter.add_mesh(pv.Box(bounds=body), name=WATER_PARTS[1], **look)
-    middle, size = 0.5 * (low + high), high - low
-    surface = pv.Plane(
-        center=[*middle[:2], high[2]], direction=[0, 0, 1], i_size=size[0], j_size=size[1]
-    )
-    plotter.add_mesh(surface, name=WATER_PARTS[0], color=WATER, opacity=0.4, lighting=False)
+    plotter.add_mesh(moved(body, low), name=WATER_PARTS[1], **look)
+    surface = pv.Plane(center=[*size[:2] / 2, depth], i_size=size[0], j_size=size[1])
+    look = {"color": WATER, "opacity": 0.4, "lighting": False}
+    plotter.add_mesh(moved(surface, low), name=WATER_PARTS[0], **look)
 
 
 @dataclass(frozen=True)
@@ -380,15 +367,12 @@ def _add_arrows(plotter: Plotter, arrows: Arrows, unit: float, length: float) ->
     chosen = speed > 0.02 * unit
     if unit < STILL or not chosen.any():
         return
-    cloud = pv.PolyData(arrows.points[chosen])
+    points = arrows.points[chosen]
+    cloud = pv.PolyData(points - points[0])
     cloud["velocity"] = arrows.velocity[chosen]
-    glyphs = cloud.glyph(
-        orient="velocity",
-        scale="velocity",
-        factor=length / unit,
-        geom=pv.Arrow(tip_length=0.3, tip_radius=0.09, shaft_radius=0.025),
-    )
-    plotter.add_mesh(glyphs, color="#1d3557", ambient=0.5)
+    arrow = pv.Arrow(tip_length=0.3, tip_radius=0.09, shaft_radius=0.025)
+    glyphs = cloud.glyph(orient="velocity", scale="velocity", factor=length / unit, geom=arrow)
+    plotter.add_mesh(moved(glyphs, points[0]), color="#1d3557", ambient=0.5)
 
 
 def camera_around(low: Array, high: Array, angle_deg: float) -> Camera:
@@ -443,9 +427,8 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
         plotter.subplot(0, column)
         plotter.add_text(title, position=(0.05, 0.92), viewport=True, font_size=11, color="black")
         if column == 0:
-            plotter.add_mesh(
-                triangles_of(shape.points, shape.triangles), color="#c9a66b", ambient=0.25
-            )
+            faces = triangles_of(shape.points, shape.triangles)
+            plotter.add_mesh(faces, color="#c9a66b", ambient=0.25)
             plotter.add_mesh(_lines(shape.points, shape.edges), color="#303030", line_width=2)
         elif column == 1:
             ends = np.sort(shape.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]], axis=2)
@@ -455,12 +438,8 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
             cloud = pv.PolyData(shape.sphere_centre)
             cloud["diameter"] = 2 * shape.sphere_radius
             ball = pv.Sphere(radius=0.5, theta_resolution=20, phi_resolution=20)
-            plotter.add_mesh(
-                cloud.glyph(scale="diameter", orient=False, geom=ball),
-                color="#c9a66b",
-                smooth_shading=True,
-                ambient=0.25,
-            )
+            balls = cloud.glyph(scale="diameter", orient=False, geom=ball)
+            plotter.add_mesh(balls, color="#c9a66b", smooth_shading=True, ambient=0.25)
         plotter.view_vector((-0.75, -1.0, 0.55), viewup=(0, 0, 1))
         plotter.camera.zoom(1.15)
     plotter.screenshot(str(path))

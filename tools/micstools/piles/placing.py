@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from micstools.reading.places import ends as unit_ends
 from micstools.reading.reader import Run
 from micstools.reading.units import Unit, Units
 from micstools.shapes.geometry import Array
@@ -47,9 +48,7 @@ class Placing:
 
 def ends(run: Run) -> Array:
     """Centroids (n, 2) [m] of the released free blocks at the end; ways through a period go on."""
-    start = _starts(run)
-    way = run.bodies.position[-1, _released(run)] - start
-    return np.asarray((run.into_tank(start) + way)[:, :2])
+    return unit_ends(run)[_released(run), :2]
 
 
 def _starts(run: Run) -> Array:

@@ -17,14 +17,14 @@ _PLAIN = {_TOGETHER: " ", "²": "2", "³": "3", "°": "deg", "–": "-", "±": "
 
 
 def figure(value: float, digits: int = 3) -> str:
-    """A number rounded to `digits`, without an exponent from 1e-4 to 1e6; a dash for nan."""
+    """A number in `digits`, never rounded to tens; no exponent from 1e-4 to 1e6, a dash for nan."""
     if not np.isfinite(value):
         return "–" if np.isnan(value) else str(value)
     rounded = float(f"{value:.{digits - 1}e}")
     if rounded and not 1e-4 <= abs(rounded) < 1e6:
         return f"{rounded:.{digits}g}"
     places = digits - 1 - int(np.floor(np.log10(abs(rounded) or 1.0)))
-    return _without_zeros(f"{rounded:.{max(0, places)}f}")
+    return _without_zeros(f"{value:.{max(0, places)}f}")
 
 
 def _without_zeros(text: str) -> str:

@@ -52,30 +52,29 @@ def cells(run: Run, fields: Fields) -> ImageData:
     return image
 
 
-def shares_at_points(run: Run, fields: Fields) -> Any:
-    """The shares of liquid and solid on points: the centres of the cells and the sides of the tank
-    (a pyvista.RectilinearGrid)."""
+def moved(mesh: Any, low: Array) -> Any:
+    """A mesh about zero, moved to `low` (3) [m] in double precision, which VTK does not keep."""
+    mesh.points = np.asarray(mesh.points, float) + low
+    return mesh
+
+
+def water(run: Run, fields: Fields) -> tuple[PolyData, PolyData]:
+    """Where the share of liquid is one half, outside of solids, and the border of what has more of
+    it; empty where all is liquid, or none."""
     import pyvista as pv
 
-    faces = zip(run.grid.faces, run.grid.centres, strict=True)
-    grid = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) for f, c in faces))
+    if not fields.liquid.min() < 0.5 < fields.liquid.max():
+        return pv.PolyData(), pv.PolyData()
+    grid, low = run.grid, run.grid.low
+    sides = zip(grid.faces, grid.centres, low, strict=True)  # the shares are those at the centres
+    points = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) - at for f, c, at in sides))
     for name in ("liquid", "solid"):
-        grid.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
-    return grid
-
-
-def water_surface(points: Any) -> PolyData:
-    """Where the share of liquid is one half, outside of solids; `points` as `shares_at_points` has
-    them. Empty where all is water, or none."""
-    import pyvista as pv
-
-    liquid = points.point_data["liquid"]
-    if not liquid.min() < 0.5 < liquid.max():
-        return pv.PolyData()
+        points.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
     surface = points.contour([0.5], scalars="liquid")
     if surface.n_points:
         surface = surface.clip_scalar(scalars="solid", value=0.5)
-    return surface
+    body = points.clip_scalar(scalars="liquid", value=0.5, invert=False)
+    return moved(surface, low), moved(body.extract_surface(algorithm="dataset_surface"), low)
 
 
 def at(run: Run, t: float) -> MultiBlock:
@@ -95,8 +94,8 @@ def at(run: Run, t: float) -> MultiBlock:
     if len(run.bed[1]):
         found.append(triangles_of(*run.bed), "bed")
     if fields is not None:
-        water = water_surface(shares_at_points(run, fields))
-        if water.n_points:
-            found.append(water, "water")
+        surface, _ = water(run, fields)
+        if surface.n_points:
+            found.append(surface, "water")
     found.field_data["time"] = [run.bodies.time[row]]
     return found
