@@ -24,7 +24,8 @@ from PIL import Image, ImageSequence
 from calls import ROOT, going_on, mics_tools, python, until
 from micstools.pictures import exports, labels, movie, plots, reel, scene
 from micstools.pictures.movie import Film
-from micstools.reading.reader import BadRun, Run
+from micstools.reading import vtk_data
+from micstools.reading.reader import BadRun, Bodies, Run
 from micstools.shapes.shape import hexapod
 from synthetic import UPRIGHT, Motion, write_run
 
@@ -84,6 +85,8 @@ def test_blocks_are_found_by_their_numbers_from_one(loose_pile: Run) -> None:
         assert set(np.unique(ids[ids > 0])) == seen
         middle = [np.nonzero(ids == k)[1].mean() for k in (1, 2, 3)]
         assert middle == sorted(middle)
+    with patch.object(Bodies, "there", lambda bodies, _: np.ones(bodies.n, bool)):  # on a crane
+        assert len(vtk_data.blocks(loose_pile, 0)) == loose_pile.bodies.n
 
 
 def test_a_number_is_written_where_its_block_is_seen() -> None:

@@ -118,7 +118,7 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     # One actor for all blocks of a colour: thousands are drawn in seconds
     colours = block_colours(run)
     alike: dict[str, list[Placed]] = {}
-    for k, body in present_bodies(run, row).items():
+    for k, body in present_bodies(run, row, held=True).items():
         alike.setdefault(colours[k], []).append(body)
     for colour, bodies in alike.items():
         faces = [triangles_of(body.points, body.shape.triangles) for body in bodies]
@@ -200,10 +200,8 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
     if blocks:
         faces = vtk_data.joined(list(blocks.values()))
         number = faces.cell_data["body"].astype(np.int64)
-        colour = np.stack([number % 256, number // 256 % 256, number // 65536], axis=1)
-        plotter.add_mesh(
-            faces, scalars=colour.astype(np.uint8), rgb=True, preference="cell", **flat
-        )
+        colour = np.stack([number % 256, number // 256 % 256, number // 65536], axis=1).astype("u1")
+        plotter.add_mesh(faces, scalars=colour, rgb=True, preference="cell", **flat)
     add_bed(plotter, run, color="white", **flat)
     look(plotter, camera)
     seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
@@ -283,9 +281,8 @@ def add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
         return
     look = look or {"color": BED, "smooth_shading": False, "ambient": 0.4, "diffuse": 0.7}
     plotter.add_mesh(bed, **look)
-    edges = bed.extract_feature_edges(
-        boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
-    )
+    others = dict.fromkeys(("feature_edges", "manifold_edges", "non_manifold_edges"), False)
+    edges = bed.extract_feature_edges(boundary_edges=True, **others)
     if not edges.n_cells:
         return
     if "ambient" in look:

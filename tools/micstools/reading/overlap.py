@@ -66,14 +66,14 @@ class Placed:
         return np.asarray(self.shape.normals @ rotation_matrix(self.quaternion).T)
 
 
-def present_bodies(run: Run, row: int) -> dict[int, Placed]:
-    """The released bodies of a run at a row, by their number; with their centroids in the tank
-    where a direction is periodic."""
+def present_bodies(run: Run, row: int, held: bool = False) -> dict[int, Placed]:
+    """The released bodies of a run at a row, by their number, `held`: those on a crane, too; with
+    their centroids in the tank where a direction is periodic."""
     b = run.bodies
     position = run.into_tank(b.position[row])
     return {
         int(k): Placed(run.shapes[b.shape[k]], position[k], b.quaternion[row, k])
-        for k in np.flatnonzero(b.present(row))
+        for k in np.flatnonzero(b.there(row) if held else b.present(row))
     }
 
 

@@ -366,7 +366,7 @@ class Run:
 
     def vtk(self, t: float) -> Any:
         """The scene at time `t` [s] as a pyvista.MultiBlock, to plot, clip and save: a surface
-        `block 1`, `block 2`, ... for each released block, the `bed` and the surface of the
+        `block 1`, `block 2`, ... for each block in the tank, the `bed` and the surface of the
         `water` where there are any. All are those of the written time of the fields nearest to
         `t`, of the nearest row in a run without; `field_data["time"]` tells which."""
         from micstools.reading import vtk_data

@@ -30,10 +30,10 @@ def joined(surfaces: list[PolyData]) -> PolyData:
 
 
 def blocks(run: Run, row: int) -> dict[int, PolyData]:
-    """The surface of each block that is released at a row, by its number from 0; on each face
-    `body`, the number from 1."""
+    """The surface of each block in the tank at a row, on a crane, too, by its number from 0; on
+    each face `body`, the number from 1."""
     found = {}
-    for k, body in present_bodies(run, row).items():
+    for k, body in present_bodies(run, row, held=True).items():
         found[k] = triangles_of(body.points, body.shape.triangles)
         found[k].cell_data["body"] = np.full(len(body.shape.triangles), k + 1)
     return found
