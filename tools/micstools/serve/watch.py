@@ -14,7 +14,7 @@ from micstools.cases import settings
 from micstools.ensembles import ensemble
 from micstools.ensembles.ensemble import Member
 from micstools.pages import motion, run_words
-from micstools.piles import pile_ensemble
+from micstools.piles import options, pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
 from micstools.serve.server import Site, apart, foreign_answer, json_answer, order_of, page_answer
@@ -88,7 +88,7 @@ class Watched:
             run = self.look()
             if run is None or not run.bodies.n:
                 return {}
-            self.still = self.still or motion.tank(run)
+            self.still = self.still or motion.tank(run, options.told(run.folder).north)
             return self.still | motion.moving(run, self.columns)
 
     def title(self) -> str:
