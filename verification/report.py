@@ -82,10 +82,10 @@ def differences(run: Run, plain: Run) -> list[str]:
     """Options of a run that are not the defaults, as `numerics coupling = 'mics'`."""
     found = []
     for group in OPTIONS:
-        own, usual = (r.parameters.get(group, [{}])[0] for r in (run, plain))
+        own = {key: run.value(group, key) for key in run.parameters.get(group, [{}])[0]}
         follows = FOLLOWS if own.get("model") == "spheres" else ()
-        found += [f"{group} {key} = {own[key]!r}" for key in own
-                  if own[key] != usual.get(key) and key not in follows]  # fmt: skip
+        found += [f"{group} {key} = {value!r}" for key, value in own.items()
+                  if value != plain.value(group, key) and key not in follows]  # fmt: skip
     return found
 
 
