@@ -123,9 +123,8 @@ def test_motions_are_those_of_the_run(loose_pile: Run) -> None:
 
 def test_a_block_waits_where_it_is_first_seen(loose_pile: Run) -> None:
     """Else it would fly there from its waiting place within a frame."""
-    run = Run(loose_pile.folder)
-    k, rows = int(run.bodies.dropped[-1]), motion.frames(run)
-    waits = run.bodies.time < run.bodies.entry_time[k]
+    run, k = Run(loose_pile.folder), int(loose_pile.bodies.dropped[-1])
+    rows, waits = motion.frames(run), run.bodies.time < run.bodies.entry_time[k]
     run.bodies.position[waits, k] = 9.0
     place = np.frombuffer(base64.b64decode(motion.scene(run)["place"]), "<f4")
     seen, late = place.reshape(len(rows), run.bodies.n, 3)[:, k], waits[rows]
