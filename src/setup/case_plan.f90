@@ -34,9 +34,9 @@ module case_plan_m
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
-  real(wp), parameter :: seconds_per_substep = 1.0e-5_wp   !! of a block that is awake [s]
-  real(wp), parameter :: seconds_per_row = 4.0e-4_wp       !! of results [s]
-  real(wp), parameter :: seconds_per_sample = 1.6e-7_wp    !! of a shape, held against the bed [s]
+  real(wp), parameter :: seconds_per_substep = 5.5e-6_wp   !! of a block that is awake [s]
+  real(wp), parameter :: seconds_per_row = 2.2e-4_wp       !! of results [s]
+  real(wp), parameter :: seconds_per_sample = 9.0e-8_wp    !! of a shape, held against the bed [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
   real(wp), parameter :: way_of_step = 0.1_wp   !! of a block that falls, over its smallest edge [-]
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
