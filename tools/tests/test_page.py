@@ -122,7 +122,6 @@ def test_motions_are_those_of_the_run(loose_pile: Run) -> None:
 
 
 def test_a_block_waits_where_it_is_first_seen(loose_pile: Run) -> None:
-    """Else it would fly there from its waiting place within a frame."""
     run, k = Run(loose_pile.folder), int(loose_pile.bodies.dropped[-1])
     rows, waits = motion.frames(run), run.bodies.time < run.bodies.entry_time[k]
     run.bodies.position[waits, k] = 9.0

@@ -21,8 +21,7 @@ def draw_pictures(given: argparse.Namespace) -> int:
             raise BadRun(f"--times {t:g}: the run goes from 0 to {last:g} s")
     views = given.view or scene.telling_views(run)
     fine = next(n for n in range(3, 18) if len({f"{t:.{n}f}" for t in times}) == len(set(times)))
-    speed = scene.arrow_speed(run, times, views)
-    style = scene.Style(width=given.width, speed=speed)
+    style = scene.Style(width=given.width, speed=scene.arrow_speed(run, times, views))
     for view in views:
         pictures = []
         for number, t in enumerate(times, start=1):

@@ -25,6 +25,7 @@ from micstools.shapes.shape import Shape
 
 Plotter = Any  # pyvista.Plotter, which is imported late
 WATER = "#7fb8e6"
+TINT: dict[str, Any] = {"color": WATER, "opacity": 0.12, "lighting": False}
 WATER_PARTS = ("surface of the water", "body of the water")
 BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
@@ -302,11 +303,10 @@ def add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
         plotter.remove_actor(name, render=False)
     surface, body = vtk_data.water(run, fields)
     if surface.n_points:
-        look: dict[str, Any] = {"opacity": 0.6, "specular": 0.6, "specular_power": 30}
+        look = {"opacity": 0.6, "specular": 0.6, "specular_power": 30}
         plotter.add_mesh(surface, name=WATER_PARTS[0], color=WATER, smooth_shading=True, **look)
     if body.n_points:
-        look = {"color": WATER, "opacity": 0.12, "lighting": False}
-        plotter.add_mesh(body, name=WATER_PARTS[1], **look)
+        plotter.add_mesh(body, name=WATER_PARTS[1], **TINT)
 
 
 def add_still_water(plotter: Plotter, run: Run) -> None:
@@ -320,11 +320,9 @@ def add_still_water(plotter: Plotter, run: Run) -> None:
     x, y, z = 1e-3 * size  # not in the sides of a bed
     depth = min(level - low[2], size[2])
     body = pv.Box(bounds=[-x, size[0] + x, -y, size[1] + y, -z, depth])
-    look = {"color": WATER, "opacity": 0.12, "lighting": False}
-    plotter.add_mesh(moved(body, low), name=WATER_PARTS[1], **look)
+    plotter.add_mesh(moved(body, low), name=WATER_PARTS[1], **TINT)
     surface = pv.Plane(center=[*size[:2] / 2, depth], i_size=size[0], j_size=size[1])
-    look = {"color": WATER, "opacity": 0.4, "lighting": False}
-    plotter.add_mesh(moved(surface, low), name=WATER_PARTS[0], **look)
+    plotter.add_mesh(moved(surface, low), name=WATER_PARTS[0], **TINT | {"opacity": 0.4})
 
 
 @dataclass(frozen=True)

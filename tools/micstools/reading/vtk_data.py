@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from micstools.reading.overlap import present_bodies
+from micstools.reading.profiles import with_ends
 from micstools.reading.reader import Fields, Run
 from micstools.shapes.geometry import Array, IntArray
 
@@ -65,16 +66,16 @@ def water(run: Run, fields: Fields) -> tuple[PolyData, PolyData]:
 
     if not fields.liquid.min() < 0.5 < fields.liquid.max():
         return pv.PolyData(), pv.PolyData()
-    grid, low = run.grid, run.grid.low
-    sides = zip(grid.faces, grid.centres, low, strict=True)  # the shares are those at the centres
-    points = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) - at for f, c, at in sides))
+    axes = zip(run.grid.faces, run.grid.centres, strict=True)
+    points = pv.RectilinearGrid(*(with_ends(f[0], c, f[-1]) - f[0] for f, c in axes))
     for name in ("liquid", "solid"):
         points.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
     surface = points.contour([0.5], scalars="liquid")
     if surface.n_points:
         surface = surface.clip_scalar(scalars="solid", value=0.5)
     body = points.clip_scalar(scalars="liquid", value=0.5, invert=False)
-    return moved(surface, low), moved(body.extract_surface(algorithm="dataset_surface"), low)
+    body = body.extract_surface(algorithm="dataset_surface")
+    return moved(surface, run.grid.low), moved(body, run.grid.low)
 
 
 def at(run: Run, t: float) -> MultiBlock:
